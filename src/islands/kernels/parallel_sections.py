@@ -26,6 +26,12 @@ from islands.kernels.simd import (
 #: Samples of a block; its rows fit into the cache of a processor.
 BLOCK = 256
 
+#: Least variance of the noise before a recording, and that of a random walk, where white noise has 1.
+_LEAST_VARIANCE, _LARGEST_VARIANCE = 1e-10, 1e12
+
+#: Part of this variance that is left out, and doublings of the number of samples that it is summed over.
+_PRECISION, _MAX_DOUBLINGS = 1e-14, 50
+
 #: States that are less are zero. Arithmetic on subnormal numbers takes a hundred times as long.
 _LEAST = 1e-150
 
@@ -59,8 +65,7 @@ def factor_sections(
     integrators,  # 1 if the last section is an integrator, whose constant is a ramp; else 0
     delays,  # int64 [input]: samples
     leads,  # bool [input]: the input itself is a response as well
-    noise,  # float64 [1 or 2, state]: autoregression of the noise, and its moving average if it has one
-    prior,  # float64 [state, state]: equations, with the right-hand side 0, of the noise before a recording
+    noise,  # float64 [2, state]: autoregression and moving average of the noise
     coefficients,  # float64 [coefficient]: of every input the sections and the lead; the constant
     starts,  # float64 [recording, state]: initial states of the noise and of the sections
     derivatives,  # whether the columns of the noise and of the poles follow those of the coefficients
@@ -90,6 +95,7 @@ def factor_sections(
     # Reflections change two columns at a time.
     w = _allocate(columns + 2, 0).values
     triangle = np.zeros((columns, columns + 2))
+    prior = weigh_past(noise)
     target, begin = (columns - 1) * x.stride + x.origin, 0
     for recording in range(ends.size):
         end, counted = ends[recording], min(begin + skipped, ends[recording])
@@ -131,6 +137,67 @@ def factor_sections(
         begin = end
     if factor.size:
         factor[:] = triangle[order:, order:columns]
+
+
+@kernel
+def weigh_past(noise):
+    """Return equations whose squares are the deviance of the noise before a recording.
+
+    They are zero for a random walk, which may begin anywhere. Without equations, noise could follow the
+    response of the system as a decay from its own states.
+    """
+    count = noise.shape[1]
+    prior, sums, largest = np.zeros((count, count)), np.empty((count, count)), 0.0
+    power, covariance = np.zeros((count, count)), np.empty((count, count))
+    if count == 0:
+        return prior
+    for i in range(count):
+        power[i, 0] = noise[0, i]
+        if i + 1 < count:
+            power[i, i + 1] = 1.0
+        for j in range(count):
+            covariance[i, j] = (noise[0, i] + noise[1, i]) * (noise[0, j] + noise[1, j])
+    # The sum of 2, 4, 8, ... terms of the response to white noise.
+    for _ in range(_MAX_DOUBLINGS):
+        _multiply(power, covariance, False, sums)
+        added = sums.copy()
+        _multiply(added, power, True, sums)
+        covariance += sums
+        largest = np.abs(covariance).max()
+        if not largest < _LARGEST_VARIANCE:
+            return prior
+        if np.abs(sums).max() <= _PRECISION * largest:
+            break
+        added[:] = power
+        _multiply(added, added, False, power)
+    # An upper factor of the covariance, from the last column on, and its inverse.
+    upper, least = np.zeros((count, count)), _LEAST_VARIANCE + 100.0 * _PRECISION * largest
+    for j in range(count - 1, -1, -1):
+        for i in range(j, -1, -1):
+            value = covariance[i, j] + (least if i == j else 0.0)
+            for k in range(j + 1, count):
+                value -= upper[i, k] * upper[j, k]
+            upper[i, j] = np.sqrt(max(value, least)) if i == j else value / upper[j, j]
+    for j in range(count):
+        prior[j, j] = 1.0 / upper[j, j]
+        for i in range(j - 1, -1, -1):
+            value = 0.0
+            for k in range(i + 1, j + 1):
+                value -= upper[i, k] * prior[k, j]
+            prior[i, j] = value / upper[i, i]
+    return prior
+
+
+@kernel
+def _multiply(a, b, transposed, out):
+    """Write the product of two square matrices, of which the second one may be transposed."""
+    count = a.shape[0]
+    for i in range(count):
+        for j in range(count):
+            value = 0.0
+            for k in range(count):
+                value += a[i, k] * (b[j, k] if transposed else b[k, j])
+            out[i, j] = value
 
 
 @kernel
@@ -255,13 +322,11 @@ def _whiten(x, noise, start, derived, columns, rows, begins, whitened):
         values[pulse] = 1.0
     residual, error = pulse + x.stride, pulse + 2 * x.stride
     _copy(values, residual, x.values, target, rows)
-    if noise.shape[0] == 2:
-        _divide_by_average(noise[1], whitened, rows, history, columns + 2)
+    _divide_by_average(noise[1], whitened, rows, history, columns + 2)
     _copy(values, error, values, target, rows)
     for lag in range(history):
         _subtract(values, error, start[lag], values, pulse - lag, rows)
-    if noise.shape[0] == 2:
-        _divide_by_average(noise[1], whitened, rows, columns + 2, columns + 3)
+    _divide_by_average(noise[1], whitened, rows, columns + 2, columns + 3)
 
 
 @kernel

@@ -14,6 +14,7 @@ from islands.estimation.linear.noise import WHITE, fit_noises
 from islands.estimation.linear.regression import Fit, Structure, minimise, project
 from islands.estimation.linear.sections import INTEGRATORS, Signal, Signals, find_poles, pair_poles
 from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
+from islands.progress import Steps
 
 #: Samples of the part of a record on which starts and dead times are searched.
 _PART = 6000
@@ -43,6 +44,7 @@ def identify_linear(
     max_order: int = 12,
     max_dead_time: int = 60,
     feedthrough: bool = False,
+    steps: Steps | None = None,
 ) -> LinearModel:
     """Identify a linear model of the least information criterion.
 
@@ -60,6 +62,8 @@ def identify_linear(
         Largest dead time in samples; not more than a sixth of the shortest recording.
     feedthrough : bool
         Whether an output may read an input of the same sample. In closed loop it must not.
+    steps : Steps, optional
+        Receives the orders that are fitted, and may stop.
 
     Returns
     -------
@@ -69,6 +73,8 @@ def identify_linear(
     ------
     RecordError
         The arrays do not fit together, have missing values, or are too short.
+    StoppedError
+        A stop is requested.
     """
     u, y = (np.asarray(each, dtype=np.float64).reshape(len(each), -1) for each in (u, y))
     lengths = tuple(segments) or (len(y),)
@@ -84,7 +90,7 @@ def identify_linear(
     longest = min(max_dead_time, min(lengths) // 6)
     # On small matrices, several threads take a hundred times as long, and sums have other bits.
     with threadpool_limits(1, user_api="blas"):
-        fits, rivals = _search(signals, longest, max_order, feedthrough)
+        fits, rivals = _search(signals, longest, max_order, feedthrough, steps or Steps())
         best = min(fits, key=attrgetter("criterion"))
         return make_model(signals, best, scales, list(map(_describe, fits)), rivals)
 
@@ -114,9 +120,11 @@ def scale_signals(
     return Signals(u, y, ends), Scales(u0, u_unit, y0, y_unit, dt)
 
 
-def _search(signals: Signals, longest: int, max_order: int, feedthrough: bool) -> tuple[list[Fit], list[Fit]]:
+def _search(
+    signals: Signals, longest: int, max_order: int, feedthrough: bool, steps: Steps
+) -> tuple[list[Fit], list[Fit]]:
     """Return the best fit of every order, on a part of a long record first, and rivals of the best one."""
-    search = Search(_take_part(signals), longest, max_order, feedthrough)
+    search = Search(_take_part(signals), longest, max_order, feedthrough, steps)
     found = search.run()
     best, rivals = search.improve(min(found, key=attrgetter("criterion")))
     found = [each for each in found if each.structure.order != best.structure.order] + [best]
@@ -124,13 +132,18 @@ def _search(signals: Signals, longest: int, max_order: int, feedthrough: bool) -
         return found, rivals
     # More samples show more: orders that a part rejects are compared again.
     larger = [each for each in found if each.structure.order >= best.structure.order]
-    return _extend_to(signals, larger), _extend_to(signals, rivals)
+    return _extend_to(signals, larger, steps), _extend_to(signals, rivals, steps)
 
 
-def _extend_to(signals: Signals, fits: Sequence[Fit]) -> list[Fit]:
+def _extend_to(signals: Signals, fits: Sequence[Fit], steps: Steps) -> list[Fit]:
     """Return the fits of a part after steps on all samples."""
-    starts = [project(signals, each.structure) for each in fits]
-    return [minimise(signals, each, 20, 1e-2) for each in starts if each is not None]
+    found = []
+    for fit in fits:
+        steps(f"linear model of order {fit.structure.order} of all samples")
+        start = project(signals, fit.structure)
+        if start is not None:
+            found.append(minimise(signals, start, 20, 1e-2))
+    return found
 
 
 def _take_part(signals: Signals) -> Signals:
@@ -157,11 +170,14 @@ def _take_distant(fits: Sequence[Fit]) -> list[Fit]:
 class Search:
     """Search for fits of increasing order."""
 
-    def __init__(self, signals: Signals, longest: int, max_order: int, feedthrough: bool) -> None:
+    def __init__(
+        self, signals: Signals, longest: int, max_order: int, feedthrough: bool, steps: Steps
+    ) -> None:
         self.signals = signals
         self.longest = longest
         self.max_order = max_order
         self.feedthrough = feedthrough
+        self.steps = steps
         self.high: HighOrder | None = None
         self.fits: dict[int, Fit] = {}
 
@@ -174,6 +190,7 @@ class Search:
         )
         self._keep(self._fit([static]))
         for order in range(1, min(_SMALL, self.max_order) + 1):
+            self.steps(f"linear model of order {order}")
             self._keep(self._fit(list(self._starts(order))))
         for fit in self._reduce():
             self._keep(self._colour(fit))
@@ -196,6 +213,7 @@ class Search:
             return []
         found = []
         for order in range(_SMALL + 1, min(self.max_order, self.high.vectors.shape[1]) + 1):
+            self.steps(f"linear model of order {order}")
             structure = self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
             start = project(self.signals, structure)
             # Without the noise, poles of a closed loop would move away from the consistent ones.
@@ -209,6 +227,7 @@ class Search:
         order = self.best.structure.order
         while order < min(self.max_order, self.best.structure.order + _PATIENCE):
             order += 1
+            self.steps(f"linear model of order {order}")
             self._keep(self._fit(list(self._starts(order))))
         return [self.fits[order] for order in sorted(self.fits)]
 
@@ -260,6 +279,7 @@ class Search:
         """Return the fit after changes of its structure that reduce the criterion, and those that do not."""
         improved, rivals = True, list[Fit]()
         while improved:
+            self.steps(f"changes of the linear model of order {fit.structure.order}")
             improved, rivals = False, []
             tried = [project(self.signals, each) for each in self._list_neighbours(fit)]
             for start in sorted(filter(None, tried), key=attrgetter("criterion"))[:_NEIGHBOURS]:

@@ -29,9 +29,6 @@ from islands.kernels.parallel_sections import factor_sections, solve_rows
 #: A column that keeps at most this part of its norm depends on the columns before it.
 _DEPENDENT = 1e-10
 
-#: Noise with poles this near to the unit circle is a random walk, which may begin anywhere.
-_WALK = 1e-6
-
 #: Reduction of the deviance for which no step is taken: it is no reason to prefer a model.
 _NEGLIGIBLE = 1e-3
 
@@ -158,11 +155,15 @@ class Fit:
     def measure_deviance(self, squares: Signal) -> float:
         """Return the deviance for given sums of squares."""
         mean_squares = np.maximum(squares, np.finfo(float).tiny) / self.counts
+        return float(self.signals.samples * np.log(mean_squares).sum() + 2.0 * self._bounded)
+
+    @cached_property
+    def _bounded(self) -> int:
+        """Number of values on which the information does not grow with the number of samples."""
         before, first = self.structure.before, self.signals.first
-        levels = 0 if before is None else np.count_nonzero(before != first)
-        free = sum(each.size for each in self.starts) + levels
-        free += len(self.starts) * self.structure.skipped * len(first)
-        return float(self.signals.samples * np.log(mean_squares).sum() + 2.0 * free)
+        levels = 0 if before is None else int(np.count_nonzero(before != first))
+        outputs, recordings = len(self.states), len(first)
+        return outputs * recordings * (self.structure.order + self.structure.skipped) + levels
 
     @property
     def criterion(self) -> float:
@@ -214,7 +215,6 @@ def _factor(
 
 def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> None:
     """Call the kernel for an output."""
-    noise = structure.noise[output]
     factor_sections(
         signals.u,
         signals.y[output],
@@ -225,27 +225,9 @@ def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> Non
         len(structure.parts) - len(structure.sections),
         structure.delays[output],
         structure.leads[output],
-        noise,
-        _weigh_past(noise),
+        structure.noise[output],
         *rest,
     )
-
-
-def _weigh_past(noise: Signal) -> Signal:
-    """Return equations whose squares are the deviance of the noise before a recording, if it is stationary.
-
-    Without it, noise could follow the response of the system as a decay from its own states.
-    """
-    states = noise.shape[1]
-    a = np.eye(states, k=1)
-    a[:, :1] = noise[0][:, None]
-    if np.abs(np.linalg.eigvals(a)).max(initial=0.0) > 1.0 - _WALK:
-        return np.zeros((states, states))
-    gain = noise.sum(axis=0)
-    covariance = np.linalg.solve(np.eye(states**2) - np.kron(a, a), np.outer(gain, gain).ravel())
-    values, vectors = np.linalg.eigh(covariance.reshape(states, states))
-    weighted = vectors.T / np.sqrt(np.maximum(values, _DEPENDENT))[:, None]
-    return np.asarray(np.linalg.qr(weighted, mode="r"))
 
 
 def _measure_columns(factor: Signal, own: Signal) -> Signal:

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_lyapunov
 from scipy.signal import lfilter
 
-from islands.kernels.parallel_sections import BLOCK, factor_sections, solve_rows
+from islands.kernels.parallel_sections import BLOCK, factor_sections, solve_rows, weigh_past
 
 SECTIONS = np.array([[-1.5, 0.8], [-0.9, 0.0], [-1.0, 0.0]])  # the last one is an integrator
 SIZES = np.array([2, 1, 1])
@@ -10,7 +11,6 @@ ENDS = np.array([BLOCK + 17, 3 * BLOCK])
 DELAYS, LEADS = np.array([2, 0]), np.array([True, False])
 NOISE = np.array([[0.5, -0.2], [0.6, 0.1]])
 BEFORE = np.array([[0.3, -1.0], [2.0, 0.7]])
-PRIOR = np.array([[1.0, 0.3], [0.0, 2.0]])
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def factor(u, y, skipped, coefficients, starts, derivatives=False):
     residual, found = np.zeros(y.size), np.zeros((size, size))
     own = np.zeros((2, 6, 6 + size))
     factor_sections(
-        *(u, y, ENDS, BEFORE, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE, PRIOR),
+        *(u, y, ENDS, BEFORE, skipped, SECTIONS, SIZES, 1, DELAYS, LEADS, NOISE),
         *(coefficients, starts, derivatives, residual, found, own),
     )
     return residual, found, own
@@ -69,7 +69,7 @@ def make_rows(error, free, columns, poles, past):
         noises.append((find_innovations(NOISE - change) - find_innovations(NOISE + change)) / 2e-6)
     rows = np.vstack([pulses, whiten(free), whiten(columns), noises, whiten(poles), whiten(error)])
     before = np.zeros((len(rows), 2))
-    before[:2] = PRIOR.T
+    before[:2] = weigh_past(NOISE).T
     return np.hstack([before, rows])
 
 
@@ -113,6 +113,21 @@ def test_rows_of_initial_states_have_the_states_of_a_recording(record):
     for rows, start in zip(own, starts, strict=True):
         moment = rows[:, -1] - rows[:, 6:-1] @ coefficients
         np.testing.assert_allclose(np.linalg.solve(rows[:, :6], moment), start, 1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("noise", [NOISE, np.array([[0.99], [-0.2]]), np.zeros((2, 0))])
+def test_states_of_noise_are_weighed_by_their_stationary_covariance(noise):
+    a, gain = np.eye(noise.shape[1], k=1), noise.sum(axis=0)
+    a[:, :1] = noise[0][:, None]
+    weights = weigh_past(noise)
+    if noise.size:
+        covariance = solve_discrete_lyapunov(a, np.outer(gain, gain))
+        np.testing.assert_allclose(weights.T @ weights, np.linalg.inv(covariance), 1e-6)
+    assert (np.tril(weights, -1) == 0.0).all()
+
+
+def test_noise_without_a_variance_has_free_states():
+    assert (weigh_past(np.array([[1.2, -0.1], [0.3, 0.0]])) == 0.0).all()
 
 
 def test_equations_are_solved_with_the_least_squares():

@@ -4,6 +4,7 @@ from scipy.signal import lfilter
 
 from islands.errors import RecordError
 from islands.estimation.linear.identify import identify_linear
+from islands.progress import Steps, StoppedError
 
 # A search takes more than half a second of CPU.
 pytestmark = pytest.mark.ci
@@ -140,6 +141,16 @@ def test_resonance_is_found_from_a_decay():
     rate = abs(complex(-0.02, 0.5)) / 0.01
     value, error = find(found, "frequency")
     assert abs(value - rate / (2.0 * np.pi)) < 3.0 * error
+
+
+def test_stop_ends_a_search_after_the_orders_that_it_has_reported():
+    random = np.random.default_rng(7)
+    u, told = steps(random, 200), []
+    y = first_order(u[:, 0], 1.0, 0.8, 0) + random.normal(0.0, 0.01, 200)
+    watched = Steps(lambda message, _fraction=None: told.append(message), lambda: len(told) == 2)
+    with pytest.raises(StoppedError):
+        identify_linear(u, y, steps=watched)
+    assert told == ["linear model of order 1", "linear model of order 2"]
 
 
 @pytest.mark.parametrize(
