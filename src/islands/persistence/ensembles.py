@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import numpy as np
@@ -118,13 +118,19 @@ def _structure(
 ) -> EnsembleStructure:
     parameters = np.array(document.parameters, dtype=np.float64)
     structure: AnyModel
-    if isinstance(model, Model):
-        terms = tuple(_regressor(text, primitives) for text in document.regressors)
-        structure = replace(model, regressors=terms, theta=None, standard_errors=None)
-    elif isinstance(model, CoupledModel):
+    if isinstance(model, CoupledModel):
         structure = read_coupled(document.model or {}, "the ensemble", primitives)
-    else:
+    elif document.model is not None:
         structure = model_from_json(json.dumps(document.model), "the ensemble")
+    else:
+        structure = Model(
+            tuple(_regressor(text, primitives) for text in document.regressors),
+            input_names=model.input_names,
+            output_name=model.output_name,
+            dt=model.dt,
+            average=model.average,
+            preprocessing=model.preprocessing,
+        )
     if parameters.shape[1] != structure.size:
         raise ValueError(f"{parameters.shape[1]} parameters for {structure.size} terms")
     return EnsembleStructure(structure, document.weight, parameters, document.law)
