@@ -31,6 +31,12 @@ _ABOVE = 10.0
 #: remains at its end.
 _FEWEST, _LONGEST, _SETTLED = 64, 65_536, 1e-3
 
+#: Names of the gains of one integrator, to the slope of an output, and of two, to its curvature.
+INTEGRATOR_GAINS = "integrator gain", "double integrator gain"
+
+#: Points of the circle on which these are computed.
+_CIRCLE = 64
+
 #: Conversions between discrete and continuous systems.
 METHODS = ("zoh", "tustin")
 
@@ -591,8 +597,8 @@ class Quantity:
     Attributes
     ----------
     name : str
-        ``time constant``, ``frequency``, ``damping ratio``, ``pole``, ``static gain``, ``integrator gain`` or
-        ``dead time``.
+        ``time constant``, ``frequency``, ``damping ratio``, ``pole``, ``static gain``, ``integrator gain``,
+        ``double integrator gain`` or ``dead time``.
     value : float
     unit : str
         ``s`` or ``Hz``; empty for a number, and for a gain, whose unit is that of the output by that of the
@@ -626,17 +632,22 @@ def measure_mode(pole: complex, dt: float) -> tuple[Quantity, ...]:
 
 
 def _measure_gains(system: StateSpace) -> Iterable[Quantity]:
-    """Yield the gain of every input to the first output, of an integrator that to the slope of the output."""
-    values, vectors = np.linalg.eig(system.A)
-    place = int(np.abs(values - 1.0).argmin()) if system.order else 0
-    if system.order and abs(values[place] - 1.0) <= ROUNDING:
-        weights = np.linalg.solve(vectors, system.B.astype(complex))[place]
-        slopes = np.real(system.C[0] @ vectors[:, place] * weights) / system.step
-        for number, slope in enumerate(slopes.tolist(), start=1):
-            yield Quantity("integrator gain", slope, input=number)
-    else:
+    """Yield the gain of every input to the first output, of integrators that to its slope or curvature."""
+    distances = np.sort(np.abs(system.poles - 1.0))
+    # Two equal poles differ by the root of a rounding error.
+    found = [count for count in (1, 2) if (distances[count - 1 : count] ** count <= ROUNDING).any()]
+    if not found:
         for number, gain in enumerate(system.static_gain[0].tolist(), start=1):
             yield Quantity("static gain", gain, input=number)
+        return
+    # (z - 1)^count G(z) has no pole at 1, so that its value there is its mean over a circle around.
+    count, radius = found[-1], 0.5 * distances[found[-1] :].min(initial=1.0)
+    offsets = radius * np.exp(2j * np.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)
+    matrices = (1.0 + offsets)[:, None, None] * np.eye(system.order) - system.A
+    values = np.linalg.solve(matrices, np.broadcast_to(system.B, (_CIRCLE, *system.B.shape)))
+    gains = np.real(offsets**count @ (system.C[0] @ values)) / (_CIRCLE * system.step**count)
+    for number, gain in enumerate(gains.tolist(), start=1):
+        yield Quantity(INTEGRATOR_GAINS[count - 1], gain, input=number)
 
 
 def _measure_dead_times(system: StateSpace) -> Iterable[Quantity]:

@@ -31,8 +31,11 @@ _NEAR = 4
 #: Orders up to which every start is tried; those of the ARX model follow.
 _SMALL = 2
 
+#: Steps to the levels of inputs before a recording. The error of given numerators is linear in them.
+_LEVEL_STEPS = 3
+
 #: Changes of a structure that are minimised, those of the least criterion first.
-_NEIGHBOURS = 5
+_NEIGHBOURS = 8
 
 
 def identify_linear(
@@ -284,9 +287,9 @@ class Search:
             tried = [project(self.signals, each) for each in self._list_neighbours(fit)]
             for start in sorted(filter(None, tried), key=attrgetter("criterion"))[:_NEIGHBOURS]:
                 found = minimise(self.signals, start, 15, 0.1)
-                # An order that is too large hides a wrong dead time.
+                # An order that is too large hides a wrong dead time, and wrong inputs before the recordings.
                 if found.structure.order < fit.structure.order:
-                    found = self._move_delays(found)
+                    found = self._choose_before(self._move_delays(found))
                 rivals.append(found)
                 if found.criterion < fit.criterion - 1e-6:
                     fit, improved = self._colour(found), True
@@ -380,19 +383,23 @@ class Search:
             found = start and minimise(self.signals, start, 8, 0.1)
             if found is not None and found.criterion < best.criterion:
                 best = minimise(self.signals, self._move_delays(found), 20, 1e-2)
-        for before in self._list_before(best):
-            start = project(self.signals, replace(best.structure, before=before))
+        return self._choose_before(best)
+
+    def _choose_before(self, fit: Fit) -> Fit:
+        """Return the fit with the inputs before the recordings of the least criterion."""
+        for before in self._list_before(fit):
+            start = project(self.signals, replace(fit.structure, before=before))
             if start is not None:
-                best = min(best, minimise(self.signals, start, 8, 0.1), key=attrgetter("criterion"))
-        return best
+                fit = min(fit, minimise(self.signals, start, 8, 0.1), key=attrgetter("criterion"))
+        return fit
 
     def _list_before(self, fit: Fit) -> list[Signal | None]:
         """Return values of the inputs before the recordings: unknown, the first ones, and constant ones."""
         if not fit.structure.delays.any():
             return []
         levels = self.signals.first.copy()
-        for place in np.argwhere(fit.structure.delays.any(axis=0) & np.ones(levels.shape, bool)):
-            # The error is linear in a value before a recording.
+        places = np.argwhere(fit.structure.delays.any(axis=0) & np.ones(levels.shape, bool))
+        for place in [*places] * _LEVEL_STEPS:
             change, squares = np.zeros_like(levels), []
             change[tuple(place)] = 1.0
             for side in (-1.0, 0.0, 1.0):
@@ -402,7 +409,10 @@ class Search:
             curvature = above - 2.0 * here + below
             if np.isfinite(curvature) and curvature > 0.0:
                 levels[tuple(place)] += 0.5 * (below - above) / curvature
-        return [None, self.signals.first, levels]
+        known, now = [self.signals.first, levels], fit.structure.before
+        if now is None:
+            return [*known]
+        return [None, *(each for each in known if not np.array_equal(each, now))]
 
     def _list_noises(self, fit: Fit) -> list[tuple[Signal, ...]]:
         """Return noise of every output from its residual: added to it, and driving the states."""

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 from islands.estimation.linear.regression import Fit, Structure, linearise, move
 from islands.estimation.linear.sections import Section, Signal, Signals, find_poles
 from islands.kernels.state_space import simulate_state_space
-from islands.models.state_space import Quantity, StateSpace, measure_mode
-
-#: Gains of an input to the slope of an output, and to its curvature.
-INTEGRATOR_GAINS = "integrator gain", "double integrator gain"
+from islands.models.state_space import INTEGRATOR_GAINS, Quantity, StateSpace, measure_mode
 
 #: Part of a standard error by which parameters are moved for the derivatives of quantities.
 _STEP = 1e-3

@@ -146,9 +146,9 @@ class Fit:
     def deviance(self) -> float:
         """Minus twice the logarithm of the likelihood of all samples, up to a constant.
 
-        Models that count different numbers of samples are compared by the mean square. An initial state, an
-        input before a recording and a sample that is not counted cost 2, as a parameter does in the criterion
-        of Akaike: the information on them does not grow with the number of samples.
+        Models that count different numbers of samples are compared by the mean square. An input before a
+        recording and a sample that is not counted cost 2, as a parameter does in the criterion of Akaike: the
+        information on them does not grow with the number of samples.
         """
         return self.measure_deviance(self.squares)
 
@@ -162,14 +162,13 @@ class Fit:
         """Number of values on which the information does not grow with the number of samples."""
         before, first = self.structure.before, self.signals.first
         levels = 0 if before is None else int(np.count_nonzero(before != first))
-        outputs, recordings = len(self.states), len(first)
-        return outputs * recordings * (self.structure.order + self.structure.skipped) + levels
+        return len(self.states) * len(first) * self.structure.skipped + levels
 
     @property
     def criterion(self) -> float:
-        """Information criterion of Schwarz, with a dead time as a parameter."""
+        """Information criterion of Schwarz, with the initial states and a dead time as parameters."""
         structure, samples = self.structure, self.signals.samples
-        sizes = [each.size for each in (*self.coefficients, *structure.noise)]
+        sizes = [each.size for each in (*self.coefficients, *structure.noise, *self.starts)]
         count = structure.free + sum(sizes) + int(np.count_nonzero(structure.delays))
         return self.deviance + float(np.log(samples)) * count
 

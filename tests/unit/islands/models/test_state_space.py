@@ -191,3 +191,18 @@ def test_the_response_at_rest_is_the_ratio_of_a_small_sine(frequency):
     cosine, quadrature, _ = np.linalg.lstsq(basis, y, rcond=None)[0]
     response = model.linearise().respond([frequency / 0.01])[0, 0, 0]
     assert (cosine - 1j * quadrature) / amplitude == pytest.approx(response, rel=1e-3)
+
+
+@pytest.mark.parametrize("mixed", [np.eye(3), np.array([[1.0, 0.4, 0.2], [-0.3, 1.0, 0.5], [0.1, 0.2, 1.0]])])
+@pytest.mark.parametrize(("count", "name"), [(1, "integrator gain"), (2, "double integrator gain")])
+def test_gain_of_integrators_is_that_to_the_slope_or_the_curvature(mixed, count, name):
+    a = np.array([[1.0, 0.1, 0.0], [0.0, 1.0 if count == 2 else 0.6, 0.0], [0.0, 0.0, 0.9]])
+    b, c = np.array([[0.005], [0.1], [1.0]]), np.array([[3.0, 0.0, 1.0]])
+    inverse = np.linalg.inv(mixed)
+    system = StateSpace(A=mixed @ a @ inverse, B=mixed @ b, C=c @ inverse, D=np.zeros((1, 1)), dt=0.1)
+    x, y = np.zeros(3), np.zeros(400)
+    for k in range(y.size):
+        y[k] = system.C[0] @ x
+        x = system.A @ x + system.B[:, 0]
+    (gain,) = [each.value for each in system.quantities if each.name == name]
+    assert gain == pytest.approx(np.diff(y, count)[-1] / 0.1**count, rel=1e-4)

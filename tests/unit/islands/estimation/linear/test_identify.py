@@ -67,8 +67,6 @@ def test_units_of_signals_and_time_scale_the_values(two_inputs, model):
 
 def test_simulation_leaves_the_noise(two_inputs, model):
     u, y = two_inputs
-    # The inputs before the record were not their first values, so that the states apply after the dead time.
-    assert model.first == 9
     error = model.simulate(u)[80:, 0] - y[80:]
     assert np.std(error) == pytest.approx(0.02, rel=0.1)
     assert model.deviations[0] == pytest.approx(0.02, rel=0.1)
@@ -111,6 +109,38 @@ def test_integrator_has_a_pole_at_exactly_one():
     value, error = find(found, "integrator gain", 1)
     assert found.poles.tolist() == [1.0]
     assert abs(value - 0.2) < 3.0 * error
+
+
+def test_two_integrators_have_poles_at_exactly_one():
+    random = np.random.default_rng(1)
+    u = steps(random, 600, hold=15)
+    u -= u.mean()
+    speed = np.concatenate([[0.0], np.cumsum(0.03 * u[:-1, 0])])
+    y = 5.0 + np.concatenate([[0.0], np.cumsum(0.01 * speed[:-1] + 1.5e-4 * u[:-1, 0])])
+    found = identify_linear(u, y + random.normal(0.0, 2e-3 * y.std(), 600), 0.01, max_order=3)
+    value, error = find(found, "double integrator gain", 1)
+    np.testing.assert_allclose(found.poles, [1.0, 1.0], atol=1e-7)
+    assert abs(value - 3.0) < 3.0 * error
+
+
+def test_disturbance_of_the_states_is_noise_and_no_further_mode():
+    random = np.random.default_rng(2)
+    u, poles = steps(random, 800), [1.0, -1.94, 0.952]
+    driven = u[:, 0] + random.normal(0.0, 0.5, 800)
+    y = lfilter([0.0, 0.006, 0.006], poles, driven) + random.normal(0.0, 0.01, 800)
+    found = identify_linear(u, y, max_order=5)
+    assert found.order == 2
+    assert found.noise[0].shape[1] > 0
+
+
+def test_input_before_the_record_has_another_level():
+    random = np.random.default_rng(7)
+    u = 3.0 + steps(random, 500)
+    y = first_order(u[:, 0], 2.0, 0.9, 14)  # from rest with an input of 0
+    found = identify_linear(u, y + random.normal(0.0, 0.02, 500), max_order=1, max_dead_time=20)
+    value, error = find(found, "static gain", 1)
+    assert (found.order, found.first, found.delays.tolist()) == (1, 0, [[14]])
+    assert abs(value - 2.0) < 3.0 * error
 
 
 def test_dead_time_of_a_fraction_of_a_sample_is_found():
