@@ -6,7 +6,7 @@ from dataclasses import replace
 import structlog
 
 from islands.evolution.search_result import AnySearchResult
-from islands.persistence.models import model_json
+from islands.persistence.ensembles import model_file
 from islands.progress import explain_failure
 from islands.report.documents.result_folder import result_document
 from islands.report.text.statements import describe
@@ -52,7 +52,7 @@ def make_outcome(found: AnySearchResult, note: str = "", ended_by: str = "") -> 
         **({"note": note} if note else {}),
     }
     entries: Sequence[Assessment | CoupledAssessment] = found.models
-    files = [model_json(entry.final_model) for entry in entries]
+    files = [model_file(entry.final_model, entry.bands) for entry in entries]
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 

@@ -63,6 +63,7 @@ export function makeSearchSettings(initial, onChange, signal) {
       const text = name in settings ? format(settings[name]) || "none" : "by the record";
       setText(standard, `Default: ${text}.`);
       if (field.tagName === "INPUT") field.placeholder = text;
+      else setText(field.options[0], text);
     }
   }
 
@@ -90,8 +91,8 @@ export function makeSearchSettings(initial, onChange, signal) {
     const standard = el("span");
     const given = name === "structure" && chosen === LATENT ? null : initial.settings?.[name];
     if (given !== undefined && given !== null) field.value = format(given);
-    // Double grave accents mark code in the documentation.
-    const meaning = schema.description.replaceAll("``", "");
+    // Grave accents mark code in the documentation.
+    const meaning = schema.description.replaceAll("`", "");
     const row = el(
       "div",
       {},

@@ -52,7 +52,12 @@ Notation = Annotated[
 
 #: Path parameter: a figure of a linear system.
 Figure = Annotated[
-    str, Path(pattern=rf"^({'|'.join(LINEAR_FIGURES)})$", json_schema_extra={"enum": list(LINEAR_FIGURES)})
+    str,
+    Path(
+        pattern=rf"^({'|'.join(LINEAR_FIGURES)})$",
+        description="Figure of the linear system.",
+        json_schema_extra={"enum": list(LINEAR_FIGURES)},
+    ),
 ]
 
 _TEXT = {"text/plain": {"schema": {"type": "string"}}}

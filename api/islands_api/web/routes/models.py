@@ -1,6 +1,5 @@
 """Models of a job (metrics, physics checks, exports), and the whole result."""
 
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Response
@@ -115,8 +114,8 @@ async def exported(
     found = await get_model(state, caller, job, rank)
     name = f"model-{rank:02d}"
     if form == MODEL_FILE:
-        document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
-        return _text_response(await state.run_blocking(_write_model_file, job, found, document), form, name)
+        # As it was written, with its uncertainty.
+        return _text_response(found.file, form, name)
     model = any_model_from_json(found.file, f"model {rank}")
     return await export_response(state, model, form, name)
 
@@ -161,13 +160,6 @@ async def export_response(state: AppState, model: Exported, form: str, name: str
         There is no such format, or the model cannot be written in it.
     """
     return _text_response(await state.run_blocking(export, model, form), form, name)
-
-
-def _write_model_file(job: str, found: StoredModel, document: Mapping[str, Any]) -> str:
-    # The classes of results import the search.
-    from islands_service.domain.fitted_models import read_fitted  # noqa: PLC0415
-
-    return read_fitted(job, found.file, found.document, document).export(MODEL_FILE) or ""
 
 
 def _text_response(text: str, form: str, name: str) -> Response:

@@ -196,7 +196,7 @@ def test_simulate_takes_records_of_inputs_alone(run, fitted):
     one, two = (np.loadtxt(f"both/{name}.csv", delimiter=",", skiprows=1) for name in ("one", "two"))
     assert one[: len(two)].tolist() == two.tolist()
     code, _, error = run("simulate", "out", "one.csv", "--start", "x=1")
-    assert (code, "--start x: the model has y_um" in error) == (2, True)
+    assert (code, "the start of x: the model has y_um" in error) == (2, True)
     code, _, error = run("simulate", "out", "one.csv", "--bands", "0.9")
     assert (code, "--bands need the measured output" in error) == (2, True)
 
