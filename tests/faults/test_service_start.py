@@ -9,7 +9,7 @@ import pytest
 import trustme
 
 from islands_service.liveness import MISCONFIGURED
-from support.command_line import succeed
+from support.command_line import islands, succeed
 from support.processes import eventually, kill
 from support.service_processes import free_port, serving, started
 
@@ -84,8 +84,7 @@ def test_key_in_a_file_is_enough_for_the_first_start(tmp_path: Path) -> None:
 def test_api_without_a_valid_key_starts_when_a_key_is_created(tmp_path: Path) -> None:
     """No other role ends, so that jobs continue to run."""
     folder = tmp_path / "data"
-    secret = succeed("admin", "keys", "--scope", "read", "--data-dir", folder)
-    key = secret.removeprefix("islands_").partition("_")[0]
+    _, key, *_ = islands("admin", "keys", "--scope", "read", "--data-dir", folder).stderr.split()
     with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
         succeed("admin", "keys", "--revoke", key, "--data-dir", folder)
         kill(service.one("api"))
