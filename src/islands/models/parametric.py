@@ -280,6 +280,8 @@ class ParametricModel(ABC):
             A field is missing or invalid.
         """
         try:
+            if not document["inputs"]:
+                raise KeyError("inputs")
             structure = cls.read_structure(document)
             entries = {entry["name"]: entry for entry in document["parameters"]}
             # A class of one structure has its names as an attribute.
@@ -299,8 +301,8 @@ class ParametricModel(ABC):
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ModelError(f"{name} is not a model {cls.kind}: {error!r} is missing or invalid") from error
-        if not found.input_names or not all(map(isfinite, found.parameters)):
-            raise ModelError(f"{name} is not a model {cls.kind}: it needs an input and finite parameters")
+        if not all(map(isfinite, found.parameters)):
+            raise ModelError(f"{name} is not a model {cls.kind}: it needs finite parameters")
         return found
 
     @classmethod

@@ -131,6 +131,6 @@ def _match_errors(quantities: tuple[Quantity, ...], found: LinearModel) -> tuple
         nearest = min(range(len(left)), key=distances.__getitem__, default=0)
         is_known = bool(left) and isfinite(distances[nearest])
         error = float(left.pop(nearest)[1]) if is_known else nan
-        # A dead time of whole samples is chosen, not estimated.
-        errors.append(error if error > 0.0 else nan)
+        # A dead time of whole samples is chosen, not estimated; that of a fraction is another quantity.
+        errors.append(nan if each.name == "dead time" else error)
     return tuple(errors)

@@ -180,7 +180,7 @@ def _list_rows(name: str, rank: int, entry: FittedModel, record: "RecordLike | N
     return [
         ComparisonRow(
             *(name, single.output_name, rank, single.size, errors.rmse, errors.mape, errors.r2),
-            single.equation().named,
+            "; ".join(single.equation().named.splitlines()),
         )
         for single, errors in zip(list_models(entry.model), found, strict=True)
     ]

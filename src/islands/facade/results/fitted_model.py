@@ -313,7 +313,7 @@ class FittedModel:
 
     @property
     def inclusion(self) -> tuple[float, ...]:
-        """Inclusion probability of every term, in the order of the model.
+        """Inclusion probability of every term, in the order of the model; empty for named parameters.
 
         Raises
         ------
@@ -323,7 +323,10 @@ class FittedModel:
         ensemble = self.search_result.ensemble
         if ensemble is None:
             raise ModelError("the result has no ensemble: the free run of every model diverged")
-        return tuple(map(ensemble.inclusion, self.model.parameter_names))
+        # A name has another meaning in another structure.
+        return tuple(
+            map(ensemble.inclusion, self.model.parameter_names if isinstance(self.model, Model) else ())
+        )
 
     @property
     def least_squares_bias(self) -> float | None:

@@ -37,7 +37,7 @@ def test_a_model_is_within_each_library_that_has_its_terms():
     u = rng.uniform(2.0, 3.0, 200)
     y = lfilter([0.0, 0.2], [1.0, -0.8], u) + 7.0
     record = Dataset(u, y + 1e-3 * rng.standard_normal(200), 0.1)
-    settings = FitSettings(max_terms=3, certificate=0, estimator="least-squares", average=1)
+    settings = FitSettings(max_terms=3, certificate=0, estimator="extended-least-squares", average=1)
     library = take_library("magnitude", 1, 1, None)
     fit = fit_library(record, split_data(record, 0.25), library, settings)
     assert fit.is_within(take_library("polynomial", 1, 1, None))

@@ -15,7 +15,7 @@ def small():
 def test_a_comparison_has_one_row_per_result(result, small):
     compared = result.compare(small, names=("large", "small"))
     assert [row.result for row in compared.recommended] == ["large", "small"]
-    assert [row.terms for row in compared.recommended] == [result.best.model.size, 1]
+    assert [row.terms for row in compared.recommended] == [each.best.model.size for each in (result, small)]
     errors = [each.best.metrics["validation"]["free_run"].rmse for each in (result, small)]
     assert [row.rmse for row in compared.recommended] == errors
     assert str(compared).splitlines()[0] == "Errors in free run on the validation data"
