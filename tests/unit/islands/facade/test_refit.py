@@ -150,7 +150,7 @@ def test_a_document_has_the_model_whose_errors_it_states(tmp_path):
     run = simulate_freely(validated, data, saved.warm_up)
     assert metrics(data.y, run.y) == saved.metrics["validation"]["free_run"]
     for each in (saved, result.best):
-        assert each.describe_error().endswith(BEFORE_REFIT)
+        assert each.describe_errors()[-1].endswith(BEFORE_REFIT)
     assert BEFORE_REFIT in write_one("result", "headline", f=ResultFacts(document))
     assert "estimated again on all 400 samples" in " ".join(describe(document))
 
