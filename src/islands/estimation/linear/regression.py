@@ -174,7 +174,9 @@ class Fit:
 
 
 def project(signals: Signals, structure: Structure) -> Fit | None:
-    """Return the fit with the best numerators; None if it is not finite."""
+    """Return the fit with the best numerators; None if it is not finite or its noise not invertible."""
+    if not all(is_invertible(each, signals.samples) for each in structure.noise):
+        return None
     recordings, coefficients, states = signals.ends.size, [], []
     squares = np.empty(len(structure.noise))
     for output, noise in enumerate(structure.noise):
@@ -320,8 +322,7 @@ def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
         scale = 0.5**halving
         sections = _join_neighbours(move(structure.sections, scale * step.poles))
         noise = tuple([old + scale * new for old, new in zip(structure.noise, step.noise, strict=True)])
-        invertible = [is_invertible(each, signals.samples) for each in noise]
-        if not all(map(is_stable, sections)) or not all(invertible):
+        if not all(map(is_stable, sections)):
             continue
         found = project(signals, replace(structure, sections=sections, noise=noise))
         if found is not None and found.deviance < fit.deviance:
@@ -349,7 +350,7 @@ def _join_neighbours(sections: Sequence[Section]) -> tuple[Section, ...]:
 
 def is_invertible(noise: Signal, samples: int) -> bool:
     """Return whether the zeros of the noise are inside of the unit circle, as far as a record can show."""
-    return bool(np.abs(np.roots([1.0, *noise[1]])).max(initial=0.0) <= limit_zeros(samples))
+    return not noise.size or bool(np.abs(np.roots([1.0, *noise[1]])).max() <= limit_zeros(samples))
 
 
 def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: float = float("inf")) -> Fit:

@@ -133,13 +133,13 @@ def test_disturbance_of_the_states_is_noise_and_no_further_mode():
     assert found.noise[0].shape[1] > 0
 
 
-def test_input_before_the_record_has_another_level():
+def test_input_may_jump_at_the_first_sample_before_its_dead_time():
     random = np.random.default_rng(7)
     u = 3.0 + steps(random, 500)
     y = first_order(u[:, 0], 2.0, 0.9, 14)  # from rest with an input of 0
     found = identify_linear(u, y + random.normal(0.0, 0.02, 500), max_order=1, max_dead_time=20)
     value, error = find(found, "static gain", 1)
-    assert (found.order, found.first, found.delays.tolist()) == (1, 0, [[14]])
+    assert found.delays.tolist() == [[14]]
     assert abs(value - 2.0) < 3.0 * error
 
 
