@@ -170,14 +170,10 @@ def weigh_past(noise):
             break
         added[:] = power
         _multiply(added, added, False, power)
-    # An upper factor of the covariance, from the last column on, and its inverse.
+    # Rounding may leave a covariance that is not positive.
     upper, least = np.zeros((count, count)), _LEAST_VARIANCE + 100.0 * _PRECISION * largest
-    for j in range(count - 1, -1, -1):
-        for i in range(j, -1, -1):
-            value = covariance[i, j] + (least if i == j else 0.0)
-            for k in range(j + 1, count):
-                value -= upper[i, k] * upper[j, k]
-            upper[i, j] = np.sqrt(max(value, least)) if i == j else value / upper[j, j]
+    while not _factor_covariance(covariance, least, upper):
+        least *= 100.0
     for j in range(count):
         prior[j, j] = 1.0 / upper[j, j]
         for i in range(j - 1, -1, -1):
@@ -186,6 +182,23 @@ def weigh_past(noise):
                 value -= upper[i, k] * prior[k, j]
             prior[i, j] = value / upper[i, i]
     return prior
+
+
+@kernel
+def _factor_covariance(covariance, least, upper):
+    """Write the upper factor of a covariance with an added variance; return whether it is positive."""
+    for j in range(covariance.shape[0] - 1, -1, -1):
+        for i in range(j, -1, -1):
+            value = covariance[i, j] + (least if i == j else 0.0)
+            for k in range(j + 1, covariance.shape[0]):
+                value -= upper[i, k] * upper[j, k]
+            if i < j:
+                upper[i, j] = value / upper[j, j]
+            elif value < 0.5 * least:
+                return False
+            else:
+                upper[j, j] = np.sqrt(value)
+    return True
 
 
 @kernel
