@@ -33,7 +33,7 @@ _STEPS, _DECREASE = 30, 1e-3
 _DAMPING, _EASIER, _HARDER, _FAILURES = 1e-3, 0.2, 4.0, 8
 
 #: Starts of the effect of the amplitude, and the change of a pole that the weights of one make about.
-_STARTS, _SMALL = 3, 1e-3
+_STARTS, _SMALL = 2, 1e-3
 
 #: Least difference of two real poles of a section, from which it may pass to a complex pair.
 _LEAST_DISTANCE = 1e-3
