@@ -36,7 +36,7 @@ _PRECISION, _MAX_DOUBLINGS = 1e-14, 50
 _LEAST = 1e-150
 
 
-class Rows(NamedTuple):
+class BlockRows(NamedTuple):
     """Rows of samples of a block, each after the last samples of the block before.
 
     Attributes
@@ -218,7 +218,7 @@ def _allocate(rows, history):
     origin = -(-history // VECTOR) * VECTOR
     values = padded_size(rows * (origin + BLOCK))
     values[:] = 0.0
-    return Rows(values, origin + BLOCK, origin)
+    return BlockRows(values, origin + BLOCK, origin)
 
 
 @kernel
