@@ -209,7 +209,7 @@ def make_model(
     )
 
 
-class _Estimate(NamedTuple):
+class _MeasuredQuantities(NamedTuple):
     """Quantities of every output, their standard errors, and the covariance of the parameters."""
 
     quantities: tuple[tuple[Quantity, ...], ...]
@@ -222,7 +222,7 @@ class _Estimate(NamedTuple):
         return [(each.name, each.input) for own in self.quantities for each in own]
 
 
-def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _Estimate:
+def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _MeasuredQuantities:
     covariance, outputs = estimate_covariance(signals, fit), range(len(fit.coefficients))
 
     def measure(values: Signal) -> list[list[Quantity]]:
@@ -232,11 +232,11 @@ def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _Estimate:
 
     theta = _pack(fit)
     quantities = tuple(map(tuple, measure(theta)))
-    return _Estimate(quantities, _propagate(measure, quantities, theta, covariance), covariance)
+    return _MeasuredQuantities(quantities, _propagate(measure, quantities, theta, covariance), covariance)
 
 
 def _average(
-    best: _Estimate, others: Sequence[_Estimate], weights: Sequence[float]
+    best: _MeasuredQuantities, others: Sequence[_MeasuredQuantities], weights: Sequence[float]
 ) -> tuple[tuple[float, ...], ...]:
     """Return the standard errors of the best estimate over the structures that may be the true one."""
     variances: list[Signal] = [np.square(each) for each in best.errors]
