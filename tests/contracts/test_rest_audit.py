@@ -39,6 +39,7 @@ OTHERS = {
 #: Routes that answer a document and change nothing.
 ANSWERS = {
     ("POST", "/v1/jobs/{job}/models/{rank}/simulate"),
+    ("POST", "/v1/jobs/{job}/models/{rank}/scenarios"),
     ("POST", "/v1/simulations/equations"),
     ("POST", "/v1/simulations/preview"),
 }

@@ -30,6 +30,10 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/models/{rank}/figures/{figure}.csv"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}/simulation"): "read",
     ("POST", "/v1/jobs/{job}/models/{rank}/simulate"): "read",
+    ("POST", "/v1/jobs/{job}/models/{rank}/scenarios"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/linear-system"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/linear-system/{figure}.svg"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/linear-system/{figure}.csv"): "read",
     ("GET", "/v1/jobs/{job}/models/{rank}/fmu"): "read",
     ("GET", "/v1/jobs/{job}/result"): "read",
     ("GET", "/v1/jobs/{job}/figures"): "read",
@@ -103,6 +107,8 @@ def send_request(service, method, path, headers):
         body = {"json": {"text": ""}}
     if method == "POST" and path.endswith("/readings"):
         body = {"json": {}}
+    if path.endswith("/scenarios"):
+        body = {"json": {"datasets": [{"dataset": "0-csv"}]}}
     if path.endswith("/simulate"):
         body = {"json": {"samples": 10}}
     if method == "POST" and path.endswith("/records"):

@@ -540,6 +540,11 @@ class ResultFacts(RunFacts):
         """Whether the models are of a class with named parameters in place of terms."""
         return "kind" in self.model
 
+    @property
+    def has_searched_terms(self) -> bool:
+        """Whether terms of a library were searched; the recommended model may still be linear."""
+        return "library" in self.document["settings"]
+
     @cached_property
     def doubtful(self) -> list[tuple[str, float]]:
         """Terms that are not certain, each with the probability of its inclusion."""
