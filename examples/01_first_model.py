@@ -52,11 +52,20 @@ print(f"{record.samples} samples, one every {record.dt:g} s")
 #
 # `fit` writes down a library of candidate terms, here all products of at most two lagged signals, and
 # selects terms one after the other by how much of the output they explain (forward orthogonal regression).
-# The last quarter of the record is kept for validation. The result has one model for each number of terms.
+# The last quarter of the record is kept for validation. The result has one model for each number of terms,
+# and the best linear model, a state space, which is not printed here.
 fitted = islands.fit(record, library="polynomial", degree=2, lags=2)
-for model in sorted(fitted.models, key=lambda model: model.model.size)[:5]:
-    error = model.metrics["validation"]["free_run"].mape
-    print(f"{model.model.size} terms, error {error:6.3f} %: {model}")
+
+
+def print_models(result: islands.Result) -> None:
+    """Print the models with terms, by their number."""
+    equations = [model for model in result.models if model.model.kind == "narx"]
+    for model in sorted(equations, key=lambda model: model.model.size)[:5]:
+        error = model.metrics["validation"]["free_run"].mape
+        print(f"{model.model.size} terms, error {error:6.3f} %: {model}")
+
+
+print_models(fitted)
 
 # %%
 # The error is that of a *free run* over the validation data. In a free run the model is a simulator: it
@@ -72,9 +81,7 @@ for model in sorted(fitted.models, key=lambda model: model.model.size)[:5]:
 # The preset `narx` is for smooth systems. The same seed gives the same result. Fewer generations than those
 # of the preset are enough here.
 evolved = islands.identify(record, preset="narx", generations=20, max_terms=6, seed=0)
-for model in sorted(evolved.models, key=lambda model: model.model.size):
-    error = model.metrics["validation"]["free_run"].mape
-    print(f"{model.model.size} terms, error {error:6.3f} %: {model}")
+print_models(evolved)
 
 # %%
 # ## Choose a model
@@ -120,10 +127,11 @@ for model in (chosen, next(model for model in fitted.models if model.model.size 
     assert terms.keys() == true.keys(), terms
     assert all(abs(terms[name] - true[name]) < 0.01 for name in true), terms
 for result in (fitted, evolved):
-    errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in result.models}
+    equations = [each for each in result.models if each.model.kind == "narx"]
+    errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in equations}
     assert errors[2] > 5 * errors[3], errors
     assert all(value > 0.95 * errors[3] for value in errors.values()), errors
-large = [each.metrics["validation"]["free_run"].rmse for each in evolved.models if each.model.size >= 3]
+large = [value for size, value in errors.items() if size >= 3]
 assert max(large) < 1.05 * min(large)
 assert 0.009 < error.rmse < 0.011
 assert abs(simulated[100] - record.y[100]) < 0.05
