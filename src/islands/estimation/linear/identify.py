@@ -187,7 +187,7 @@ class Search:
     def run(self) -> list[Fit]:
         """Return the best fit of every order that was reached."""
         shape = len(self.signals.y), len(self.signals.u)
-        self.high = fit_high_order(self.signals, self.longest)
+        self.high = fit_high_order(self.signals, self.longest, self.feedthrough)
         static = Structure(
             (), 0, np.zeros(shape, np.int64), np.ones(shape, bool), (WHITE,) * shape[0], self.signals.first
         )
@@ -217,7 +217,7 @@ class Search:
         found = []
         for order in range(_SMALL + 1, min(self.max_order, self.high.vectors.shape[1]) + 1):
             self.steps(f"linear model of order {order}")
-            structure = self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
+            structure = self._extend(self.best.structure, self.high.find_poles(order), self.high)
             start = project(self.signals, structure)
             # Without the noise, poles of a closed loop would move away from the consistent ones.
             start = start and project(self.signals, replace(structure, noise=self._list_noises(start)[0]))
@@ -239,7 +239,7 @@ class Search:
         samples = self.signals.samples
         smaller, smallest = self.fits.get(order - 1), self.fits.get(order - 2)
         if self.high is not None and order <= self.high.vectors.shape[1]:
-            yield self._extend(self.best.structure, self.high.find_poles(order), self.high.delays, 0)
+            yield self._extend(self.best.structure, self.high.find_poles(order), self.high)
         if smaller is not None:
             for pole in grid_real(samples):
                 yield self._extend(smaller.structure, pole)
@@ -248,25 +248,22 @@ class Search:
                 yield self._extend(smallest.structure, pair)
 
     def _extend(
-        self,
-        structure: Structure,
-        poles: Iterable[complex],
-        delays: NDArray[np.int64] | None = None,
-        integrators: int | None = None,
+        self, structure: Structure, poles: Iterable[complex], high: HighOrder | None = None
     ) -> Structure:
-        """Return a structure with further poles, or with other ones and their dead times."""
-        kept = find_poles(structure.sections) if delays is None else ()
-        delays = structure.delays if delays is None else delays
-        leads = structure.leads
+        """Return a structure with further poles, or with those of the ARX model and its dead times."""
+        kept, kind = (find_poles(structure.sections), structure.integrators) if high is None else ((), 0)
+        delays, leads = structure.delays, structure.leads
         if structure.order == 0:
-            leads = np.zeros_like(leads)
-            delays = np.maximum(delays - structure.leads, 0) if delays is structure.delays else delays
+            # The response begins at the lag that the gain reads.
+            leads = (delays == 0) & self.feedthrough
+            delays = np.maximum(delays - 1, 0)
+        if high is not None:
+            delays, leads = high.delays, leads & (high.delays > 0) | high.leads
         noise = (WHITE,) * len(structure.noise)
-        kind = structure.integrators if integrators is None else integrators
         sections = tuple(pair_poles([*kept, *poles]))
         # Of a transient, a small model without its first samples would be a free decay.
         before = self.signals.first if structure.order < _SMALL else structure.before
-        return Structure(sections, kind, delays, leads & (delays > 0), noise, before)
+        return Structure(sections, kind, delays, leads, noise, before)
 
     def _fit(self, structures: Sequence[Structure]) -> Fit | None:
         """Return the best fit that the most promising structures lead to."""

@@ -29,13 +29,16 @@ class HighOrder:
     Attributes
     ----------
     delays : ndarray of int64, shape (outputs, inputs)
-        Samples before the first significant coefficient, less one.
+        Samples before the first significant coefficient, less one; not less than 0.
+    leads : ndarray of bool, shape (outputs, inputs)
+        Whether the first significant coefficient is that of the same sample.
     vectors : ndarray, shape (lags times outputs, orders)
         Left singular vectors of the Hankel matrix of the impulse responses.
     outputs : int
     """
 
     delays: NDArray[np.int64]
+    leads: NDArray[np.bool_]
     vectors: Signal
     outputs: int
 
@@ -49,17 +52,27 @@ class HighOrder:
         return poles
 
 
-def fit_high_order(signals: Signals, largest_delay: int) -> HighOrder | None:
-    """Fit the ARX model; None if the samples do not determine it."""
+def fit_high_order(signals: Signals, largest_delay: int, feedthrough: bool = False) -> HighOrder | None:
+    """Fit the ARX model; None if the samples do not determine it.
+
+    Parameters
+    ----------
+    signals : Signals
+    largest_delay : int
+    feedthrough : bool
+        Whether an output reads the inputs of the same sample. Poles of a model without them are wrong if the
+        process has a direct path.
+    """
     inputs, outputs = len(signals.u), len(signals.y)
     share = signals.samples // (_SAMPLES_PER_PARAMETER * (1 + inputs))
     lags = min(_LAGS, share)
     reach = min(lags + largest_delay, share)
     if lags < 2:
         return None
-    delays, responses = np.zeros((outputs, inputs), np.int64), []
+    direct, responses = int(feedthrough), []
+    first, delays = (np.zeros((outputs, inputs), np.int64) for _ in range(2))
     for output in range(outputs):
-        factor = _triangulate(signals, output, lags, reach)
+        factor = _triangulate(signals, output, lags, reach, direct)
         count = lags + inputs * reach + 1
         norms = np.linalg.norm(factor[:, :count], axis=0)
         norms[norms == 0.0] = 1.0
@@ -72,17 +85,19 @@ def fit_high_order(signals: Signals, largest_delay: int) -> HighOrder | None:
         errors = np.sqrt(variance * np.sum((vt[kept] / s[kept, None]) ** 2, axis=0)) / norms
         numerators = theta[lags:-1].reshape(inputs, reach)
         significant = np.abs(numerators) > _SIGNIFICANT * errors[lags:-1].reshape(inputs, reach)
-        delays[output] = np.where(significant.any(axis=1), significant.argmax(axis=1), 0)
-        delays[output] = np.minimum(delays[output], largest_delay)
-        pulses = np.zeros((inputs, _RESPONSE))
+        first[output] = np.where(significant.any(axis=1), significant.argmax(axis=1), direct)
+        delays[output] = np.clip(first[output] - direct, 0, largest_delay)
+        # The response to the same sample is no response of the modes.
+        length = direct + _RESPONSE
+        pulses = np.zeros((inputs, length))
         for place, delay in enumerate(delays[output]):
-            taken = min(reach - delay, _RESPONSE)
+            taken = min(reach - delay, length)
             pulses[place, :taken] = numerators[place, delay : delay + taken]
-        responses.append(divide_rows(-theta[:lags], pulses, np.array([_RESPONSE])))
+        responses.append(divide_rows(-theta[:lags], pulses, np.array([length]))[:, direct:])
     response = np.array(responses)  # (outputs, inputs, lags)
     if not np.isfinite(response).all() or np.abs(response).max() > 1e6:
         return None
-    return HighOrder(delays, _find_vectors(response), outputs)
+    return HighOrder(delays, first < direct, _find_vectors(response), outputs)
 
 
 def _find_vectors(response: Signal) -> Signal:
@@ -94,14 +109,18 @@ def _find_vectors(response: Signal) -> Signal:
     return np.asarray(np.linalg.svd(hankel, full_matrices=False)[0])
 
 
-def _triangulate(signals: Signals, output: int, lags: int, reach: int) -> Signal:
-    """Return the triangular factor of lagged outputs, lagged inputs, a constant and the output."""
+def _triangulate(signals: Signals, output: int, lags: int, reach: int, direct: int) -> Signal:
+    """Return the triangular factor of lagged outputs and inputs, a constant and the output.
+
+    Inputs begin with the same sample if ``direct`` is 1, with the sample before if it is 0.
+    """
     first, parts = max(lags, reach), []
     for begin, end in signals.bounds:
         for at in range(begin + first, end, BLOCK):
             last = min(at + BLOCK, end)
             rows = [sliding_window_view(signals.y[output, at - lags : last - 1], lags)[:, ::-1]]
-            rows += [sliding_window_view(u[at - reach : last - 1], reach)[:, ::-1] for u in signals.u]
+            inputs = signals.u[:, at - reach + direct : last - 1 + direct]
+            rows += [sliding_window_view(u, reach)[:, ::-1] for u in inputs]
             rows += [np.ones((last - at, 1)), signals.y[output, at:last, None]]
             parts.append(np.hstack(rows))
     size = parts[0].shape[1] if parts else 0

@@ -163,6 +163,18 @@ def test_static_gain_has_order_zero():
     assert abs(value - 4.0) < 3.0 * error
 
 
+def test_direct_path_does_not_hide_slow_modes():
+    random = np.random.default_rng(8)
+    u = steps(random, 1000)
+    slow = first_order(u[:, 0], 0.5, 0.95, 0) + np.concatenate([[0.0], np.cumsum(0.01 * u[:-1, 0])])
+    found = identify_linear(u, 2.0 * u[:, 0] + slow + random.normal(0.0, 0.01, 1000), feedthrough=True)
+    value, error = find(found, "integrator gain", 1)
+    assert found.order == 2
+    assert found.poles.max() == 1.0
+    assert found.d[0, 0] == pytest.approx(2.0, abs=0.01)
+    assert abs(value - 0.01) < 3.0 * error
+
+
 def test_resonance_is_found_from_a_decay():
     random = np.random.default_rng(6)
     k, u = np.arange(300), np.zeros((300, 1))

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from islands.estimation.linear.sections import Signals
@@ -13,3 +14,15 @@ def test_hankel_matrix_has_the_poles_and_the_dead_time():
     found = fit_high_order(Signals(u[None], y[None], np.array([1500])), 20)
     assert found.delays.tolist() == [[5]]
     np.testing.assert_allclose(np.sort_complex(found.find_poles(3)), np.sort_complex(poles), atol=0.02)
+
+
+@pytest.mark.parametrize("direct", [0.0, 5.0])
+def test_direct_path_leaves_the_poles_of_slow_modes(direct):
+    random = np.random.default_rng(2)
+    u = np.repeat(random.uniform(-1.0, 1.0, 100), 20)
+    y = direct * u + np.cumsum(np.append(0.0, 0.02 * u[:-1])) + lfilter([0.0, 0.2], [1.0, -0.9], u)
+    y += random.normal(0.0, 1e-3, u.size)
+    found = fit_high_order(Signals(u[None], y[None], np.array([2000])), 20, feedthrough=True)
+    assert found.leads.tolist() == [[direct > 0.0]]
+    assert found.delays.tolist() == [[0]]
+    np.testing.assert_allclose(np.sort(found.find_poles(2).real), [0.9, 1.0], atol=0.01)
