@@ -91,9 +91,10 @@ def load_result(folder: str) -> islands.Result:
 
 
 def describe_equation(best: islands.FittedModel) -> str:
-    """Return a short equation with four digits, or the number of terms of a long one."""
+    """Return a short equation with four digits, the number of its terms, or the order of a state space."""
     model = best.model
-    assert isinstance(model, islands.Model)
+    if not isinstance(model, islands.Model):
+        return f"linear, order {best.linearise().order}"
     if model.size > _SHORT:
         return f"{model.size} terms"
     terms = zip(model.parameters, model.equation().terms, strict=True)

@@ -114,4 +114,4 @@ def test_stages_before_and_after_the_epochs_are_reported_and_have_no_effect():
     assert set(news[first:last]) == {"epoch"}
     assessment = news.index("assessment of the final models")
     assert all(message.startswith("estimation of the final models of") for message in news[last:assessment])
-    assert set(news[assessment + 1 :]) == {"prediction bands"}
+    assert set(news[assessment + 1 :]) == {"linear model", "prediction bands"}
