@@ -303,7 +303,8 @@ def list_linear_models(
         The identification is an optional step.
     """
     steps.report(LINEAR_MODEL, None)
-    found = steps.attempt(LINEAR_MODEL, partial(assess_linear_model, split, shooting, warm_up, constraints))
+    compute = partial(assess_linear_model, split, shooting, warm_up, constraints, steps.stop)
+    found = steps.attempt(LINEAR_MODEL, compute)
     return [found] if found else []
 
 

@@ -15,6 +15,7 @@ from islands.estimation.modal_form import find_modal_form
 from islands.kernels.state_space import simulate_states
 from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.models.state_space import Quantity
+from islands.progress import Steps, Stop, never_stop
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
 
@@ -27,13 +28,20 @@ _DECAY = 0.01
 
 # The fits of all libraries of a record share its linear model.
 @lru_cache(maxsize=4)
-def identify_linear_model(record: Dataset) -> LatentModel:
+def _share_model(_record: Dataset) -> list[LatentModel]:
+    """Return the list of the linear model of a record, empty before it is identified."""
+    return []
+
+
+def identify_linear_model(record: Dataset, stop: Stop = never_stop) -> LatentModel:
     """Identify the linear model of a record; see `identify_linear`.
 
     Parameters
     ----------
     record : Dataset
         Record without missing values. An output reads the inputs that are read one sample early at sample k.
+    stop : callable, optional
+        Returns true once a stop is requested.
 
     Returns
     -------
@@ -45,14 +53,23 @@ def identify_linear_model(record: Dataset) -> LatentModel:
     RecordError
         The record is too short, or its best linear model is a static gain within the sample and its inputs
         are not read early.
+    StoppedError
+        A stop is requested.
     """
+    shared = _share_model(record)
+    if not shared:
+        shared.append(_identify(record, Steps(stop=stop)))
+    return shared[0]
+
+
+def _identify(record: Dataset, steps: Steps) -> LatentModel:
     early = [int(parse_channel_name(name).at_once) for name in record.input_names]
     late = max(early)
     rows = [np.arange(begin + late, end) for begin, end in record.bounds if end - begin > late]
     kept = np.concatenate(rows)
     u = np.column_stack([record.u[kept - lead, place] for place, lead in enumerate(early)])
     lengths = [each.size for each in rows]
-    found = identify_linear(u, record.y[kept], record.dt, lengths, feedthrough=all(early))
+    found = identify_linear(u, record.y[kept], record.dt, lengths, feedthrough=all(early), steps=steps)
     if any(np.any(found.d[0] != 0.0) and not lag for lag in found.delays[0] + early):
         raise RecordError("the output follows the input within a sample: read the inputs one sample early")
     return make_latent_model(found, record, u)

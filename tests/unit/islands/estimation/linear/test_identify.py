@@ -5,6 +5,7 @@ from scipy.signal import lfilter
 from islands.errors import RecordError
 from islands.estimation.linear.identify import identify_linear
 from islands.progress import Steps, StoppedError
+from support.latent_systems import curves_record
 
 # A search takes more than half a second of CPU.
 pytestmark = pytest.mark.ci
@@ -193,6 +194,18 @@ def test_stop_ends_a_search_after_the_orders_that_it_has_reported():
     with pytest.raises(StoppedError):
         identify_linear(u, y, steps=watched)
     assert told == ["linear model of order 1", "linear model of order 2"]
+
+
+def test_search_ends_if_a_dead_time_reduces_the_error_and_not_the_criterion():
+    # The curves of this record give a later dead time a slightly smaller error.
+    record, changes = curves_record(300, 1).records[1], []
+
+    def report(message, _fraction=None):
+        changes.extend([message] if message.startswith("changes") else [])
+
+    watched = Steps(report, lambda: len(changes) > 20)
+    found = identify_linear(record.u[:225], record.y[:225], 0.01, feedthrough=False, steps=watched)
+    assert found.delays[0][0] == 0
 
 
 @pytest.mark.parametrize(
