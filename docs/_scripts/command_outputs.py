@@ -91,10 +91,10 @@ def load_result(folder: str) -> islands.Result:
 
 
 def describe_equation(best: islands.FittedModel) -> str:
-    """Return a short equation with four digits, the number of its terms, or the order of a state space."""
+    """Return a short equation with four digits, the number of its terms, or what a state space is."""
     model = best.model
     if not isinstance(model, islands.Model):
-        return f"linear, order {best.linearise().order}"
+        return "; ".join(best.linearise().describe())
     if model.size > _SHORT:
         return f"{model.size} terms"
     terms = zip(model.parameters, model.equation().terms, strict=True)

@@ -128,6 +128,12 @@ class LibraryFit:
         settings = {**self.found.settings, **further}
         return replace(self, found=replace(self.found, settings=settings))
 
+    @property
+    def recommended_equation(self) -> Assessment:
+        """Recommended model of those with terms; the linear model is the same for every library."""
+        equations = tuple(entry for entry in self.found.models if isinstance(entry.model, Model))
+        return replace(self.found, models=equations).recommended
+
     def is_within(self, library: TrialLibrary) -> bool:
         """Return whether a library, at the rate of the record, has all terms of the recommended model."""
         record, model = self.found.split.estimation, self.found.recommended.model

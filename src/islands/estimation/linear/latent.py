@@ -119,10 +119,12 @@ def make_latent_model(found: LinearModel, record: Dataset, u: Signal) -> LatentM
 def _measure_states(a: Signal, b: Signal, u: Signal) -> Signal:
     """Return the standard deviation of each state, 1 of one that does not move; a pair has one."""
     order = len(a)
-    theta = np.concatenate([a.ravel(), b.ravel(), np.zeros(2 * order + u.shape[1] + 1)])
+    # A simulation ends at large states, so that their unit must not be that of the output.
+    unit = float((np.abs(b) @ np.abs(u).max(axis=0)).max(initial=0.0)) or 1.0
+    theta = np.concatenate([a.ravel(), (b / unit).ravel(), np.zeros(2 * order + u.shape[1] + 1)])
     states = np.empty((len(u), order))
     rows = simulate_states(theta, np.zeros(0, np.int64), np.ascontiguousarray(u), np.zeros(order), states)
-    found = states[:rows].std(axis=0)
+    found = unit * states[:rows].std(axis=0)
     for place in np.flatnonzero(np.diagonal(a, 1)):
         found[place : place + 2] = np.hypot(*found[place : place + 2])
     return np.where(found > 0.0, found, 1.0)

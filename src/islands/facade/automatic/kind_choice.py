@@ -126,10 +126,11 @@ def choose_kind(
 ) -> tuple[Choice, Mapping[str, LibraryFit]]:
     """Choose the kind of a record.
 
-    The recommended models of the kinds are compared as `recommend` compares the models of a search: the
-    smallest without a significantly larger error counts, of equal sizes that of the first kind. Hysteresis is
-    chosen within 25 % of the least error if the output rests while the inputs rest. If dead times were
-    estimated, models of the chosen kind without them are compared with those that have them in the same way.
+    The recommended models with terms of the kinds are compared as `recommend` compares the models of a
+    search: the smallest without a significantly larger error counts, of equal sizes that of the first kind.
+    Hysteresis is chosen within 25 % of the least error if the output rests while the inputs rest. If dead
+    times were estimated, models of the chosen kind without them are compared with those that have them in
+    the same way.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def choose_kind(
     # One kind alone needs no comparison.
     fitted = {kind: libraries[kind].with_delays(trials.delays) for kind in promising[len(promising) == 1 :]}
     fits = _fit_each(fitted, {}, fit_kind, steps)
-    bounded = {kind: each for kind, each in fits.items() if _is_bounded(each.found.recommended)}
+    bounded = {kind: each for kind, each in fits.items() if _is_bounded(each.recommended_equation)}
     compared, errors, count = _measure_alike(record, bounded)
     kind, reason = _select_kind(record, libraries, trials, compared, errors, count)
     failure = steps.not_computed.get(DEAD_TIMES)
@@ -199,7 +200,7 @@ def _compare_delays(
     bounded = {
         name: tried[name]
         for name in libraries
-        if name in tried and _is_bounded(tried[name].found.recommended)
+        if name in tried and _is_bounded(tried[name].recommended_equation)
     }
     best, reason = kind, "no model has a finite error without it"
     if bounded:
@@ -214,10 +215,10 @@ def _compare_delays(
 def _measure_alike(
     record: Dataset, fits: Mapping[str, LibraryFit]
 ) -> tuple[dict[str, Assessment], dict[str, float], int]:
-    """Return the recommended models of fits and their errors in means of equal length, and that length."""
+    """Return the recommended equations of fits and their errors in means of equal length, and that length."""
     count = lcm(*(each.average for each in fits.values()))
     models = {
-        name: average_errors(each.found.recommended, count // each.average) for name, each in fits.items()
+        name: average_errors(each.recommended_equation, count // each.average) for name, each in fits.items()
     }
     return models, {name: measure_share(model, record) for name, model in models.items()}, count
 
