@@ -174,8 +174,11 @@ class SearchResult:
 
     @property
     def linear(self) -> Assessment | None:
-        """Best linear model on the validation data; None if the recommended model is linear."""
-        if is_linear(self.recommended.model):
+        """Best linear model on the validation data; None if the recommended model is linear.
+
+        Models of hysteresis are not compared: those of the search that are linear have its constraints.
+        """
+        if self.requires_property_1 or is_linear(self.recommended.model):
             return None
         return next((entry for entry in self.models if is_linear(entry.model)), None)
 
