@@ -1,6 +1,6 @@
 """Coupled model of latent models, which read the inputs only: one state space, or one per output."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import accumulate
 from typing import ClassVar
@@ -100,17 +100,17 @@ class CoupledLatentModel(CoupledModel):
 
         Those of shared states have no output before them.
         """
-        return tuple(self._name_parameters())
+        return tuple(self._name_parameters(output_signals(self)))
 
     @property
     def parameters(self) -> tuple[float, ...]:
         """Parameters of all models; those of shared states once."""
-        return tuple(self._name_parameters().values())
+        return tuple(self._name_parameters(output_signals(self)).values())
 
     @property
     def size(self) -> int:
         """Number of parameters."""
-        return len(self._name_parameters())
+        return len(self.parameter_names)
 
     @property
     def standard_errors(self) -> tuple[float, ...] | None:
@@ -132,11 +132,12 @@ class CoupledLatentModel(CoupledModel):
             ),
         )
 
-    def _name_parameters(self) -> dict[str, float]:
+    def _name_parameters(self, outputs: Iterable[str]) -> dict[str, float]:
+        """Return the parameters by name, with the given names of the outputs."""
         shares = self.shares_states
         return {
             _name_parameter(output, name, shares): value
-            for output, model in zip(output_signals(self), self.models, strict=True)
+            for output, model in zip(outputs, self.models, strict=True)
             for name, value in zip(model.names, model.parameters, strict=True)
         }
 
@@ -185,7 +186,7 @@ class CoupledLatentModel(CoupledModel):
             line="\n".join(each.line for each in written),
             plain="\n".join(lines),
             named="\n".join(each.named for each in written),
-            terms=tuple(f"{signal_names(model)[0]}: {name}" for model in self.models for name in model.names),
+            terms=tuple(self._name_parameters([signal_names(model)[0] for model in self.models])),
             latex="\\begin{{gathered}} {} \\end{{gathered}}".format(" \\\\ ".join(rows)),
             mathml="\n".join([*(each.mathml for each in written), *elements]),
         )
@@ -234,7 +235,7 @@ class CoupledLatentModel(CoupledModel):
             signals=(*output_signals(self), *names, *input_signals(self)),
             starts=tuple(start for each in moved for start in each.starts),
             leads=(*self.leads[:outputs], *(0,) * sum(orders), *self.leads[outputs:]),
-            parameters=self._name_parameters(),
+            parameters=self._name_parameters(output_signals(self)),
             warm_up=self.maximum_lag,
             dt=None if self.dt is None else float(self.dt),
             values=describe_values(self),

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+import islands
 from islands.facade.coupled.joined_results import join_latent_results
 from islands.facade.coupled.shared_states import measure_results, search_large_system, search_shared_states
 from islands.progress import Steps
 from islands.records.coupled import CoupledRecord, split_coupled
 from islands.records.dataset import Dataset
+from support.undrawn import undrawn_figures
 
 
 def make_data():
@@ -23,7 +25,7 @@ def make_data():
 
 
 @pytest.mark.ci
-def test_the_joined_model_has_the_states_once():
+def test_the_joined_model_has_the_states_once_also_after_it_is_read(tmp_path):
     data, steps = make_data(), Steps()
     results = search_shared_states(data, {"method": "fit"}, {}, 0, steps)
     joined = join_latent_results(data, results, 0, steps)
@@ -33,6 +35,12 @@ def test_the_joined_model_has_the_states_once():
     assert model.linearise().static_gain.shape == (2, 2)
     assert measure_results(results) < 2.0
     assert all(each.best.prediction_bands for each in results)
+    with undrawn_figures():
+        joined.save(tmp_path, figures=())
+    saved = islands.load(tmp_path).best
+    assert saved.model == model
+    record = data.validation
+    np.testing.assert_array_equal(saved.simulate(record).y, joined.best.simulate(record).y)
 
 
 def test_constraints_and_small_systems_are_left_to_the_separate_searches():
