@@ -102,7 +102,12 @@ class Minimisation:
             if self._normal is None:
                 self._normal = normal_equations(self._residual, self.theta, self.error, self._directions)
             normal, gradient = self._normal
-            damped = normal + self._damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
+            with np.errstate(over="ignore", invalid="ignore"):
+                damped = normal + self._damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
+            if not (np.isfinite(damped).all() and np.isfinite(gradient).all()):
+                # No damping makes a step that small. The singular values of infinite numbers never converge.
+                self._damping = _MAX_DAMPING
+                return
             candidate = self.theta - self._directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
             trial = self._residual(candidate) if self._is_allowed(candidate) else None
             if trial is None or not mean_square(trial) < mean_square(self.error):
