@@ -222,14 +222,15 @@ def estimate_initial_states(
         States at the last sample of the warm-up; NaN if the model diverges before it, so that the free run
         diverges at its first sample.
     """
-    theta, codes = model.theta, model.codes
-    found = []
-    for first in start.tolist():
-        x, u = estimate_first_states(model, record, first - warm_up, first)
-        rows = len(u) - 1
-        bounded = simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) == rows
-        found.append(x if bounded else np.full(len(x), np.nan))
-    return np.array(found)
+    parts = [(first - warm_up, first) for first in start.tolist()]
+    return np.array([_continue(model, *estimate_first_states(model, record, *part)) for part in parts])
+
+
+def _continue(model: LatentModel, x: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the states at the last sample of the inputs; NaN if the model diverges before it."""
+    rows = len(u) - 1
+    bounded = simulate_state_space(model.theta, model.codes, u[:rows], x, np.empty(rows)) == rows
+    return x if bounded else np.full(len(x), np.nan)
 
 
 def estimate_coupled_states(
@@ -253,13 +254,10 @@ def estimate_coupled_states(
     pairs = [*zip(model.models, records, strict=True)]
     if not model.shares_states:
         return np.hstack([estimate_initial_states(*pair, start, warm_up) for pair in pairs])
-    theta, codes, found = model.models[0].theta, model.models[0].codes, []
-    for first in start.tolist():
-        x, u = _estimate_shared_states(model, records, first - warm_up, first)
-        rows = len(u) - 1
-        bounded = simulate_state_space(theta, codes, u[:rows], x, np.empty(rows)) == rows
-        found.append(x if bounded else np.full(len(x), np.nan))
-    return np.array(found)
+    parts = [(first - warm_up, first) for first in start.tolist()]
+    return np.array(
+        [_continue(model.models[0], *_estimate_shared_states(model, records, *part)) for part in parts]
+    )
 
 
 def _estimate_shared_states(
