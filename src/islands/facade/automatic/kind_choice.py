@@ -32,9 +32,6 @@ NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
 #: Name of the step that compares the fits of the kinds.
 CHOICE = "choice of the kind of record"
 
-#: Steps after the comparison of the kinds.
-_OMITTED = CHOICE, CERTIFICATES, BANDS
-
 #: Fits the library of a kind with the dead times of the trials.
 FitKind = Callable[[TrialLibrary], LibraryFit]
 
