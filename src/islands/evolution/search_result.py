@@ -306,7 +306,7 @@ def list_linear_models(
         The identification is an optional step.
     """
     steps.report(LINEAR_MODEL, None)
-    compute = partial(assess_linear_model, split, shooting, warm_up, constraints, steps.stop)
+    compute = partial(assess_linear_model, split, shooting, warm_up, constraints, steps)
     found = steps.attempt(LINEAR_MODEL, compute)
     return [found] if found else []
 

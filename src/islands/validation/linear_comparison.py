@@ -4,13 +4,13 @@ from islands.errors import RecordError
 from islands.estimation.estimator_table import BOX_JENKINS
 from islands.estimation.linear.latent import identify_linear_model
 from islands.estimation.parameter_constraints import constraint
-from islands.progress import Stop, never_stop
+from islands.progress import Steps
 from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
 
 
 def assess_linear_model(
-    split: Split, shooting: int, warm_up: int = 0, constraints: str = "none", stop: Stop = never_stop
+    split: Split, shooting: int, warm_up: int = 0, constraints: str = "none", steps: Steps | None = None
 ) -> Assessment | None:
     """Identify the linear model of the estimation data and assess it.
 
@@ -23,8 +23,8 @@ def assess_linear_model(
         Number of samples before the first prediction, at least.
     constraints : str
         Statements that the model must meet.
-    stop : callable, optional
-        Returns true once a stop is requested, which ends the identification with a `StoppedError`.
+    steps : Steps, optional
+        Receives the orders that are fitted. A stop ends the identification with a `StoppedError`.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def assess_linear_model(
     if constraint(constraints).sums:
         return None
     try:
-        model = identify_linear_model(split.estimation, stop)
+        model = identify_linear_model(split.estimation, steps)
         first = max(warm_up, model.maximum_lag)
         found = assess(model, split, shooting, first, constraints, BOX_JENKINS)
     except RecordError:

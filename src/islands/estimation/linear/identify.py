@@ -16,6 +16,9 @@ from islands.estimation.linear.sections import INTEGRATORS, Signal, Signals, fin
 from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
 from islands.progress import Steps
 
+#: Largest number of poles that is tried by default.
+LARGEST_ORDER = 12
+
 #: Samples of the part of a record on which starts and dead times are searched.
 _PART = 6000
 
@@ -44,7 +47,7 @@ def identify_linear(
     dt: float = 1.0,
     segments: Sequence[int] = (),
     *,
-    max_order: int = 12,
+    max_order: int = LARGEST_ORDER,
     max_dead_time: int = 60,
     feedthrough: bool = False,
     steps: Steps | None = None,
@@ -79,6 +82,36 @@ def identify_linear(
     StoppedError
         A stop is requested.
     """
+    orders = identify_orders(
+        u,
+        y,
+        dt,
+        segments,
+        max_order=max_order,
+        max_dead_time=max_dead_time,
+        feedthrough=feedthrough,
+        steps=steps,
+    )
+    return next(orders)
+
+
+def identify_orders(
+    u: NDArray[np.float64],
+    y: NDArray[np.float64],
+    dt: float = 1.0,
+    segments: Sequence[int] = (),
+    *,
+    max_order: int = LARGEST_ORDER,
+    max_dead_time: int = 60,
+    feedthrough: bool = False,
+    steps: Steps | None = None,
+) -> Iterator[LinearModel]:
+    """Yield the model of the least information criterion, then the best ones of other orders.
+
+    They are the smaller orders and the next larger ones that were compared. Of a long record, models of
+    smaller orders are those of the part on which structures are searched. Parameters and errors are those of
+    `identify_linear`.
+    """
     u, y = (np.asarray(each, dtype=np.float64).reshape(len(each), -1) for each in (u, y))
     lengths = tuple(segments) or (len(y),)
     if len(u) != len(y) or sum(lengths) != len(y):
@@ -93,9 +126,15 @@ def identify_linear(
     longest = min(max_dead_time, min(lengths) // 6)
     # On small matrices, several threads take a hundred times as long, and sums have other bits.
     with threadpool_limits(1, user_api="blas"):
-        fits, rivals = _search(signals, longest, max_order, feedthrough, steps or Steps())
+        fits, smaller, rivals = _search(signals, longest, max_order, feedthrough, steps or Steps())
         best = min(fits, key=attrgetter("criterion"))
-        return make_model(signals, best, scales, list(map(_describe, fits)), rivals)
+        model = make_model(signals, best, scales, list(map(_describe, fits)), rivals)
+    yield model
+    for fit in (*smaller, *fits):
+        if fit is not best and fit.structure.order <= best.structure.order + _PATIENCE:
+            with threadpool_limits(1, user_api="blas"):
+                model = make_model(fit.signals, fit, scales)
+            yield model
 
 
 def _describe(fit: Fit) -> LinearCandidate:
@@ -125,17 +164,21 @@ def scale_signals(
 
 def _search(
     signals: Signals, longest: int, max_order: int, feedthrough: bool, steps: Steps
-) -> tuple[list[Fit], list[Fit]]:
-    """Return the best fit of every order, on a part of a long record first, and rivals of the best one."""
+) -> tuple[list[Fit], list[Fit], list[Fit]]:
+    """Return the best fit of every order that all samples compare, smaller ones, and rivals of the best one.
+
+    Of a long record, orders below the best one of a part are not compared on all samples.
+    """
     search = Search(_take_part(signals), longest, max_order, feedthrough, steps)
     found = search.run()
     best, rivals = search.improve(min(found, key=attrgetter("criterion")))
     found = [each for each in found if each.structure.order != best.structure.order] + [best]
     if signals.samples <= _PART:
-        return found, rivals
+        return found, [], rivals
     # More samples show more: orders that a part rejects are compared again.
     larger = [each for each in found if each.structure.order >= best.structure.order]
-    return _extend_to(signals, larger, steps), _extend_to(signals, rivals, steps)
+    smaller = [each for each in found if each.structure.order < best.structure.order]
+    return _extend_to(signals, larger, steps), smaller, _extend_to(signals, rivals, steps)
 
 
 def _extend_to(signals: Signals, fits: Sequence[Fit], steps: Steps) -> list[Fit]:
@@ -143,7 +186,9 @@ def _extend_to(signals: Signals, fits: Sequence[Fit], steps: Steps) -> list[Fit]
     found = []
     for fit in fits:
         steps(f"linear model of order {fit.structure.order} of all samples")
-        start = project(signals, fit.structure)
+        # The inputs before the part are not those before the recordings.
+        before = None if fit.structure.before is None else signals.first
+        start = project(signals, replace(fit.structure, before=before))
         if start is not None:
             found.append(minimise(signals, start, 20, 1e-2))
     return found

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.estimation.linear.identify import identify_linear
+from islands.estimation.linear.identify import identify_orders
 from islands.estimation.linear.model import LinearModel
 from islands.estimation.linear.sections import Signal
 from islands.estimation.modal_form import find_modal_form
 from islands.kernels.state_space import simulate_states
 from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.models.state_space import Quantity
-from islands.progress import Steps, Stop, never_stop
+from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
 
@@ -26,22 +26,22 @@ _SAMPLES_PER_STATE, _LARGEST_MEMORY, _LARGEST_PART = 3, 100, 0.05
 _DECAY = 0.01
 
 
-# The fits of all libraries of a record share its linear model.
+# The fits of all libraries of a record share its linear models.
 @lru_cache(maxsize=4)
-def _share_model(_record: Dataset) -> list[LatentModel]:
-    """Return the list of the linear model of a record, empty before it is identified."""
+def _share_models(_record: Dataset) -> list[LatentModel]:
+    """Return the list of the linear models of a record, empty before they are identified."""
     return []
 
 
-def identify_linear_model(record: Dataset, stop: Stop = never_stop) -> LatentModel:
+def identify_linear_model(record: Dataset, steps: Steps | None = None) -> LatentModel:
     """Identify the linear model of a record; see `identify_linear`.
 
     Parameters
     ----------
     record : Dataset
         Record without missing values. An output reads the inputs that are read one sample early at sample k.
-    stop : callable, optional
-        Returns true once a stop is requested.
+    steps : Steps, optional
+        Receives the orders that are fitted, and may stop.
 
     Returns
     -------
@@ -56,23 +56,32 @@ def identify_linear_model(record: Dataset, stop: Stop = never_stop) -> LatentMod
     StoppedError
         A stop is requested.
     """
-    shared = _share_model(record)
+    return identify_linear_models(record, steps)[0]
+
+
+def identify_linear_models(record: Dataset, steps: Steps | None = None) -> list[LatentModel]:
+    """Identify the linear model of a record, and the best ones of other orders after it.
+
+    Parameters and errors are those of `identify_linear_model`.
+    """
+    shared = _share_models(record)
     if not shared:
-        shared.append(_identify(record, Steps(stop=stop)))
-    return shared[0]
+        shared += _identify(record, steps)
+    return shared
 
 
-def _identify(record: Dataset, steps: Steps) -> LatentModel:
+def _identify(record: Dataset, steps: Steps | None) -> list[LatentModel]:
     early = [int(parse_channel_name(name).at_once) for name in record.input_names]
     late = max(early)
     rows = [np.arange(begin + late, end) for begin, end in record.bounds if end - begin > late]
     kept = np.concatenate(rows)
     u = np.column_stack([record.u[kept - lead, place] for place, lead in enumerate(early)])
     lengths = [each.size for each in rows]
-    found = identify_linear(u, record.y[kept], record.dt, lengths, feedthrough=all(early), steps=steps)
-    if any(np.any(found.d[0] != 0.0) and not lag for lag in found.delays[0] + early):
+    found = list(identify_orders(u, record.y[kept], record.dt, lengths, feedthrough=all(early), steps=steps))
+    causal = [each for each in found if not each.d[0][each.delays[0] + early == 0].any()]
+    if found[0] not in causal:
         raise RecordError("the output follows the input within a sample: read the inputs one sample early")
-    return make_latent_model(found, record, u)
+    return [make_latent_model(each, record, u) for each in causal]
 
 
 def make_latent_model(found: LinearModel, record: Dataset, u: Signal) -> LatentModel:

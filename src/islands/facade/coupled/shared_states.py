@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from islands.estimation.estimator_table import refinement_criterion
-from islands.estimation.latent_models import MODAL_ORDERS
+from islands.estimation.linear.identify import LARGEST_ORDER
 from islands.estimation.shared_states import search_shared_models
 from islands.evolution.search_result import (
     BANDS,
@@ -45,7 +45,7 @@ def search_large_system(
     data, described, options, seed, steps
         As for `search_shared_states`.
     """
-    return search_shared_states(data, described, options, seed, steps, MODAL_ORDERS[-1] + 1)
+    return search_shared_states(data, described, options, seed, steps, LARGEST_ORDER + 1)
 
 
 def search_shared_states(

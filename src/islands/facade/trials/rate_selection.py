@@ -98,7 +98,7 @@ def _choose_count(split: Split, library: TrialLibrary, least: int, steps: Steps)
             compute_errors(average_split(split, count), library.at_rate(count), interval // count)
         )
     # Means reduce the noise that least squares takes for dynamics, which a linear model separates itself.
-    linear = assess_linear_model(split, 1, constraints=library.constraints, stop=steps.stop)
+    linear = assess_linear_model(split, 1, constraints=library.constraints, steps=steps)
     if linear is not None and linear.validation_error < _root_mean_square(errors_at[0]):
         predicted = simulate_freely(linear.model, split.validation, linear.warm_up).y
         residual = replace(split.validation, y=split.validation.y - predicted)

@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import lfilter
 
 from islands.errors import RecordError
-from islands.estimation.linear.identify import identify_linear
+from islands.estimation.linear.identify import identify_linear, identify_orders
 from islands.progress import Steps, StoppedError
 from support.latent_systems import curves_record
 
@@ -206,6 +206,29 @@ def test_search_ends_if_a_dead_time_reduces_the_error_and_not_the_criterion():
     watched = Steps(report, lambda: len(changes) > 20)
     found = identify_linear(record.u[:225], record.y[:225], 0.01, feedthrough=False, steps=watched)
     assert found.delays[0][0] == 0
+
+
+@pytest.mark.ci
+def test_many_recordings_of_a_long_record_have_inputs_of_their_own_before_them():
+    random, lengths = np.random.default_rng(8), (3000, 3000, 1000)
+    u = np.concatenate([steps(random, each) for each in lengths])
+    starts = np.cumsum((0, *lengths[:-1]))
+    for begin in starts:
+        u[begin : begin + 10] = 0.0
+    parts = [u[begin : begin + length, 0] for begin, length in zip(starts, lengths, strict=True)]
+    y = np.concatenate([first_order(part, 2.0, 0.9, 5) for part in parts])
+    found = identify_linear(u, y + random.normal(0.0, 0.05, y.size), 1.0, lengths, max_order=2)
+    assert (found.order, found.delays[0][0]) == (1, 5)
+
+
+def test_orders_begin_with_the_best_one():
+    random = np.random.default_rng(9)
+    u = steps(random, 300)
+    y = first_order(u[:, 0], 2.0, 0.9, 3) + random.normal(0.0, 0.05, 300)
+    best, *others = identify_orders(u, y, max_order=3)
+    assert best.candidates == identify_linear(u, y, max_order=3).candidates
+    compared = {each.order for each in best.candidates if each.order <= best.order + 2}
+    assert sorted([best.order, *(each.order for each in others)]) == sorted(compared)
 
 
 @pytest.mark.parametrize(
