@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
 from islands.estimation.latent_data import LatentData, measure_held_out
 from islands.estimation.state_space_fit import StateSpaceFit
-from islands.models.latent import StateSpaceLayout, find_direct
+from islands.models.latent import StateSpaceLayout, reads_at_once
 from islands.models.unit_functions import find_codes, parse_unit
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes
@@ -36,6 +36,8 @@ class FittedStateSpace:
         Mean squared error of the held-out rows, in the squared unit of the output.
     mean_square : float
         Mean squared error of the rows of the estimation, of the scaled output.
+    delays : tuple of int
+        Dead time of each input in samples; none if empty.
     """
 
     #: Systems of every size in a hall of fame. There are many sizes.
@@ -49,6 +51,7 @@ class FittedStateSpace:
     states: tuple[tuple[float, ...], ...]
     fitness: float
     mean_square: float
+    delays: tuple[int, ...] = ()
 
     @property
     def layout(self) -> StateSpaceLayout:
@@ -62,13 +65,15 @@ class FittedStateSpace:
 
     @property
     def size(self) -> int:
-        """Number of free parameters, and of the further operations of units that are no single function."""
-        return sum(self.free) + sum(parse_unit(each).operations - 1 for each in self.units)
+        """Number of free parameters, dead times, and further operations of units of several functions."""
+        late = sum(map(bool, self.delays))
+        return sum(self.free) + late + sum(parse_unit(each).operations - 1 for each in self.units)
 
     @property
     def key(self) -> tuple[str, ...]:
         """Structure as text; equal keys mean equal structures."""
-        return f"order {self.order}", *self.units, "".join("01"[each] for each in self.free)
+        free = "".join("01"[each] for each in self.free)
+        return f"order {self.order}", *self.units, free, *map(str, self.delays)
 
     @property
     def niche(self) -> tuple[str, ...]:
@@ -77,15 +82,14 @@ class FittedStateSpace:
 
     @property
     def reads_at_once(self) -> bool:
-        """Whether the output reads an input at the same row."""
+        """Whether the output reads an input of the same sample."""
         named = zip(self.layout.names, self.theta, strict=True)
-        return bool(find_direct(name for name, value in named if value != 0.0))
+        return reads_at_once((name for name, value in named if value != 0.0), self.delays)
 
     def draft(self) -> "Draft":
         """Return a draft with this structure and these parameters."""
-        return Draft(
-            self.layout, self.units, np.array(self.theta), np.array(self.free), np.array(self.states)
-        )
+        theta, free, states = np.array(self.theta), np.array(self.free), np.array(self.states)
+        return Draft(self.layout, self.units, theta, free, states, delays=self.delays)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +109,8 @@ class Draft:
         Steps of the estimation of all parameters.
     effect_steps : int
         Steps of the estimation of all parameters outside of the arguments of the units, before the others.
+    delays : tuple of int
+        Dead time of each input in samples; none if empty.
     """
 
     layout: StateSpaceLayout
@@ -114,6 +120,7 @@ class Draft:
     states: NDArray[np.float64]
     steps: int = 0
     effect_steps: int = 0
+    delays: tuple[int, ...] = ()
 
     def take(self, states: Sequence[int], units: Sequence[int]) -> "Draft":
         """Return a draft with some of the states and units only, by their places."""
@@ -134,6 +141,7 @@ class Draft:
             select(self.theta),
             select(self.free),
             self.states[:, kept],
+            delays=self.delays,
         )
 
     def begin(
@@ -145,6 +153,7 @@ class Draft:
 
     def estimate(self, data: LatentData) -> "FittedStateSpace | EvaluationOutcome":
         """Estimate the parameters and measure the error of the held-out rows."""
+        data = data.delay(self.delays)
         fit = self.begin(data.used, data.conditions)
         try:
             if self.effect_steps:
@@ -175,6 +184,7 @@ class Draft:
             tuple(map(tuple, fit.states.tolist())),
             error,
             fit.mean_square,
+            self.delays,
         )
 
 

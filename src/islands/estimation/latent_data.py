@@ -19,8 +19,8 @@ from islands.estimation.constraints.state_space import (
     StateSpaceConditions,
     find_conditions,
 )
-from islands.estimation.linear_state_space import measure_deviations
 from islands.estimation.state_space_fit import StateSpaceFit
+from islands.kernels.state_space import simulate_states
 from islands.models.latent import StateSpaceLayout
 from islands.records.dataset import Dataset
 from islands.records.flat_extremes import SensorLimits, find_limits
@@ -172,6 +172,16 @@ class LatentData:
         stated = (each.inputs for each in self.stated.statics if each.channel)
         return next(stated, tuple(self.scales.mean.tolist()))
 
+    def delay(self, delays: tuple[int, ...]) -> "LatentData":
+        """Return the data whose inputs of a row are those of some samples before; empty for none.
+
+        Before a recording, an input has the first value that is read.
+        """
+        if not any(delays):
+            return self
+        used, final, held_out = _cut(self.scaled, self.scales.scale_limits(self.limits), delays)
+        return replace(self, used=used, final=final, held_out=held_out)
+
     def without_statics(self) -> "LatentData":
         """Return the same data without the static conditions, which a search does not impose."""
         return replace(self, stated=replace(self.stated, statics=()))
@@ -197,17 +207,37 @@ def make_latent_data(record: Dataset, constraints: str = "none") -> LatentData:
     scaled = replace(record, u=u, y=y)
     limits = find_limits(record.y, record.bounds)
     limits = limits.mirror(record.y) if stated.is_odd else limits
-    scaled_limits = scales.scale_limits(limits)
+    blocks = _cut(scaled, scales.scale_limits(limits), (0,) * record.inputs)
+    return LatentData(record, scaled, *blocks, scales, limits, stated)
+
+
+# The systems of a search have few different dead times.
+@lru_cache(maxsize=4)
+def _cut(
+    record: Dataset, limits: tuple[float, float], delays: tuple[int, ...]
+) -> tuple[SegmentLanes, SegmentLanes, "HeldOutRows"]:
+    """Return the used, the final and the held-out rows of a scaled record with delayed inputs."""
+    late = _delay_inputs(record, delays)
     used: list[Segment] = []
     final: list[Segment] = []
     whole: list[Segment] = []
-    for begin, end in _spread(list(_cut_blocks(scaled))):
+    for begin, end in _spread(list(_cut_blocks(record))):
         cut = end - round(_HELD_OUT * (end - begin))
-        used.append(_take(scaled, begin, min(cut, begin + _USED_ROWS), scaled_limits))
-        final.append(_take(scaled, begin, min(end, begin + _FINAL_ROWS), scaled_limits))
-        whole.append(_take(scaled, begin, end, scaled_limits))
-    blocks = SegmentLanes(used), SegmentLanes(final), _hold_out(whole, used)
-    return LatentData(record, scaled, *blocks, scales, limits, stated)
+        used.append(_take(late, begin, min(cut, begin + _USED_ROWS), limits))
+        final.append(_take(late, begin, min(end, begin + _FINAL_ROWS), limits))
+        whole.append(_take(late, begin, end, limits))
+    return SegmentLanes(used), SegmentLanes(final), _hold_out(whole, used)
+
+
+def _delay_inputs(record: Dataset, delays: Sequence[int]) -> Dataset:
+    """Return the record with the inputs of some samples before."""
+    if not any(delays):
+        return record
+    u = record.u.copy()
+    for begin, end in record.bounds:
+        for place, delay in enumerate(delays):
+            u[begin:end, place] = record.u[np.maximum(np.arange(begin, end) - delay, begin), place]
+    return replace(record, u=u)
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -256,6 +286,35 @@ def estimate_start(
 ) -> NDArray[np.float64]:
     """Estimate the states at the first row of a block."""
     return estimate_states(theta, codes, segment.take(0, _count_memory(segment)), np.zeros(order))
+
+
+def measure_deviations(
+    theta: NDArray[np.float64],
+    codes: NDArray[np.int64],
+    u: NDArray[np.float64],
+    start: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """Return the standard deviation of each state for an input, 1 of a state that does not move.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (parameters,)
+        Parameters in the order of the kernel.
+    codes : ndarray of int64, shape (units,)
+    u : ndarray, shape (rows, inputs)
+    start : ndarray, shape (states,)
+        States at the first row.
+
+    Returns
+    -------
+    ndarray, shape (states,), or None
+        None after a divergence.
+    """
+    states = np.empty((len(u), len(start)))
+    if simulate_states(theta, codes, u, start, states) < len(u):
+        return None
+    found = states.std(axis=0)
+    return np.where(found > 0.0, found, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

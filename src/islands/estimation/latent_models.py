@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from islands.estimation.balanced_form import find_balanced_form
 from islands.estimation.constraints.state_space import take_system
 from islands.estimation.constraints.static_state import StateSpaceParameters
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
@@ -23,9 +24,10 @@ from islands.estimation.latent_data import (
     LatentData,
     estimate_start,
     make_latent_data,
+    measure_deviations,
     measure_held_out,
 )
-from islands.estimation.linear_state_space import fit_linear_state_space, measure_deviations
+from islands.estimation.linear.latent import identify_linear_models
 from islands.estimation.modal_form import find_modal_form
 from islands.kernels.state_space import evaluate_unit
 from islands.models.latent import LatentModel, StateSpaceLayout
@@ -34,16 +36,9 @@ from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
-#: Numbers of states of the linear systems, and of those that have modes only. A system of 24 states has 576
-#: entries of the matrix A, and 48 in its modes.
-ORDERS, MODAL_ORDERS = (1, 2, 3, 4, 6), (8, 12, 16, 20, 24)
-
-#: Gain of the squared held-out error, as a fraction, of a modal order over all smaller ones and over a
-#: constant; the first order without it is left out, and ends them.
-_ORDER_GAIN = 0.1
-
-#: Rows of the first estimation of a linear system, at most.
-_LINEAR_ROWS = 20_000
+#: Largest order of a linear system whose matrix A is free. A system of 12 states has 144 entries, and 24 in
+#: its modes.
+_LARGEST_FULL = 6
 
 #: Steps of a linear system, of a system without some parameters, and of the final estimation.
 _LINEAR_STEPS, _REDUCED_STEPS, _FINAL_STEPS = 10, 15, 50
@@ -82,34 +77,44 @@ def search_linear_models(record: Dataset, steps: Steps) -> list[LatentModel]:
 
 
 def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]:
-    """Fit linear systems of several orders; of large orders only as long as they gain much.
+    """Fit linear systems of several orders to the blocks, from the linear models of the record.
+
+    The dead times are those of the best linear model, or none.
 
     Raises
     ------
+    RecordError
+        The record is too short.
     StoppedError
-        A stop is requested before the first one.
+        A stop is requested.
     """
-    steps.check("linear state spaces")
-    found: list[FittedStateSpace] = []
-    for order in (*ORDERS, *MODAL_ORDERS):
-        if found and steps.skip("linear state spaces of larger orders"):
-            break
-        steps.report(f"linear state space of order {order}", 0.0)
-        model = fit_linear_state_space(data.scaled[:_LINEAR_ROWS], order)
-        if model is None:
-            continue
-        theta, free = model.theta, np.ones(model.theta.size, bool)
-        if order in MODAL_ORDERS:
-            theta = _write_in_modes(model.layout, theta, (), data.used[0].u, np.zeros(order))
-            free = _free_modes(model.layout, theta)
-        states = np.array([estimate_start(theta, find_codes(()), each, order) for each in data.used])
-        draft = Draft(model.layout, (), theta, free, states, steps=_LINEAR_STEPS)
-        system = make_odd(draft, data).estimate(data)
-        if order in MODAL_ORDERS and not _gains_much(system, found, data):
-            break
-        if not isinstance(system, EvaluationOutcome):
-            found.append(system)
-    return found
+    models = identify_linear_models(data.record, steps)
+    drafts = [
+        _begin(model, delays, data)
+        for model in sorted(models, key=lambda model: model.order)
+        for delays in dict.fromkeys([models[0].delays, (0,) * data.record.inputs])
+        if model.order
+    ]
+    found = [make_odd(each, data).estimate(data) for each in drafts]
+    return [each for each in found if isinstance(each, FittedStateSpace)]
+
+
+def _begin(model: LatentModel, delays: tuple[int, ...], data: LatentData) -> Draft:
+    """Return a draft of a linear model with given dead times, of a large one with its modes only."""
+    layout, theta = model.layout, data.scales.use_scaled_units(model.layout, model.theta)
+    late, free, blocks = data.delay(delays), _free_modes(layout, theta), layout.split(theta)
+    # The states move about zero.
+    decay = np.eye(model.order) - blocks["A"]
+    rest = np.linalg.lstsq(decay, blocks["o"], rcond=1e-12)[0]
+    blocks["o"] -= decay @ rest
+    blocks["level"] += blocks["C"] @ rest
+    if model.order <= _LARGEST_FULL:
+        balanced = _transform(theta, layout, find_balanced_form(blocks["A"], blocks["B"], blocks["C"]))
+        scales = measure_deviations(balanced, model.codes, late.used[0].u, np.zeros(model.order))
+        theta = balanced if scales is None else _transform(balanced, layout, np.diag(scales))
+        free = np.ones(theta.size, bool)
+    states = np.array([estimate_start(theta, model.codes, each, model.order) for each in late.used])
+    return Draft(layout, (), theta, free, states, _LINEAR_STEPS, delays=delays if any(delays) else ())
 
 
 def meet_conditions(
@@ -135,14 +140,6 @@ def make_odd(draft: Draft, data: LatentData) -> Draft:
     for name in ("s", "o", "level"):
         blocks[name][...] = False
     return replace(draft, units=tuple(map(make_odd_unit, draft.units)), free=free)
-
-
-def _gains_much(
-    system: FittedStateSpace | EvaluationOutcome, smaller: Sequence[FittedStateSpace], data: LatentData
-) -> bool:
-    """Return whether a system is much better than all smaller ones, and than a constant."""
-    least = min([data.scales.height**2, *(each.fitness for each in smaller)])
-    return isinstance(system, FittedStateSpace) and system.fitness < (1.0 - _ORDER_GAIN) * least
 
 
 def _free_modes(layout: StateSpaceLayout, theta: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -203,13 +200,15 @@ def estimate_models(
 def _remove_blocks(system: FittedStateSpace, data: LatentData, direct: bool) -> FittedStateSpace:
     """Return the system without the blocks of parameters that the held-out error does not need.
 
-    Without ``direct``, the output reads no input at the same row: the units read none, or it reads no unit.
+    Without ``direct``, the output reads no input of the same sample: units read none, or it reads no unit.
     """
     blocks = system.layout.split(np.arange(len(system.theta)))
     of_states, of_inputs = blocks["W"][:, : system.order].ravel(), blocks["W"][:, system.order :].ravel()
     through, past = blocks["D"], blocks["F"]
-    if not direct:
-        tried = [_fit_without(system, np.append(through, each), data) for each in (past, of_inputs)]
+    at_once = np.flatnonzero(np.array(system.delays or (0,) * system.inputs) == 0)
+    if at_once.size and not direct:
+        read = blocks["W"][:, system.order + at_once].ravel()
+        tried = [_fit_without(system, np.append(through[at_once], each), data) for each in (past, read)]
         system = min(tried, key=lambda each: each.fitness)
     for block in (past, through, of_inputs, of_states):
         if np.array(system.free)[block].any():
@@ -256,7 +255,7 @@ def _finish(system: FittedStateSpace, data: LatentData, steps: Steps) -> FittedS
 
     None if the system cannot meet the conditions.
     """
-    draft = system.draft()
+    draft, data = system.draft(), data.delay(system.delays)
     fit = draft.begin(data.final, data.conditions)
     fit.advance(_FINAL_STEPS, lambda: steps.skip("refinement of parameters"))
     if not fit.meets_conditions:
@@ -326,7 +325,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
     data : LatentData
         Blocks of the record.
     """
-    layout, record = system.layout, data.record
+    layout, record, data = system.layout, data.record, data.delay(system.delays)
     theta = _write_in_modes(
         layout, np.array(system.theta), system.units, data.used[0].u, np.array(system.states[0])
     )
@@ -338,14 +337,16 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
     wiring = tuple(name for name, value in zip(layout.names, theta, strict=True) if value != 0.0)
     decay = log(_DECAY) / log(min(max(radius, 1e-3), 1.0 - 1e-6))
     shortest = min(record.segments) * _LARGEST_PART
-    # The first sample of a segment lacks its input.
-    memory = 1 + round(max(_SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
+    # The first sample of a segment lacks its input, and those before a dead time.
+    memory = 1 + max(system.delays, default=0)
+    memory += round(max(_SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
     return LatentModel(
         order=layout.order,
         units=system.units,
         wiring=wiring,
         memory=memory,
         operating_inputs=data.operating_inputs,
+        delays=system.delays,
         limits=data.limits,
         parameters=tuple(value for value in theta.tolist() if value != 0.0),
         input_names=record.input_names,

@@ -105,7 +105,7 @@ def mutate(system: FittedStateSpace, structure: str, rng: Generator) -> Draft:
 def _simulate_states(system: FittedStateSpace, data: LatentData) -> NDArray[np.float64]:
     """Return the states over the first rows of all blocks, one after the other."""
     theta, codes, found = np.array(system.theta), find_codes(system.units), []
-    for block, start in zip(data.used, system.states, strict=True):
+    for block, start in zip(data.delay(system.delays).used, system.states, strict=True):
         u = block.u[:_COMPARED_ROWS]
         states = np.empty((len(u), system.order))
         simulate_states(theta, codes, u, np.array(start), states)
@@ -167,7 +167,8 @@ def _join(
     """Return the draft of the blocks of its values and of its free parameters."""
     layout = StateSpaceLayout(states.shape[1], draft.layout.inputs, len(units))
     theta, free = (np.concatenate([blocks[name].ravel() for name in layout.blocks]) for blocks in parts)
-    return Draft(layout, units, theta, free.astype(bool), states, STEPS, effect_steps if units else 0)
+    first = effect_steps if units else 0
+    return Draft(layout, units, theta, free.astype(bool), states, STEPS, first, draft.delays)
 
 
 def _restrict(draft: Draft, structure: str) -> Draft:

@@ -306,7 +306,7 @@ class LatentModel(ParametricModel):
     @property
     def reads_at_once(self) -> bool:
         """Whether the output reads an input at sample k, itself or through a unit."""
-        return bool(find_direct(self.names))
+        return reads_at_once(self.names, self.delays)
 
     @property
     def theta(self) -> NDArray[np.float64]:
@@ -501,6 +501,11 @@ def find_direct(names: Iterable[str]) -> set[int]:
     through = [name for name in names if name[0] == "v" and name[1:].split("_")[0] in units]
     numbers = [*(name[1:] for name in direct), *(name.partition("_")[2] for name in through)]
     return {int(number or 1) - 1 for number in numbers}
+
+
+def reads_at_once(names: Iterable[str], delays: Sequence[int]) -> bool:
+    """Return whether the output reads an input without a dead time if these parameters are not zero."""
+    return any(not any(delays[place : place + 1]) for place in find_direct(names))
 
 
 def _round(value: float) -> str:

@@ -331,6 +331,7 @@ def _read_state_space(document: Mapping[str, Any]) -> FittedStateSpace:
         tuple(tuple(map(float, state)) for state in document["states"]),
         float(document["fitness"]),
         float(document["mean_square"]),
+        tuple(map(int, document.get("delays", ()))),
     )
 
 

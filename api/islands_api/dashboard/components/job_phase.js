@@ -9,7 +9,7 @@ import { isDiagnosis, isSearch } from "./job_words.js";
 const SEARCH = [
   ["Record", ["loading", "reading"]],
   ["Preset", ["preset auto"]],
-  ["First models", ["sampling rate", "forward selection", "swap search", "linear state space"]],
+  ["First models", ["sampling rate", "forward selection", "swap search", "linear model of order"]],
   ["Search", ["search", "starting", "waiting"]],
   ["Final models", ["estimation", "final estimation", "choice of the equations", "refinement"]],
   ["Validation", ["assessment", "prediction bands"]],

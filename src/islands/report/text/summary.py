@@ -5,7 +5,6 @@ from contextlib import suppress
 from typing import Any
 
 from islands.errors import ModelError
-from islands.estimation.latent_models import ORDERS
 from islands.evolution.latent_variation import EFFECT_STEPS, FURTHER_STEPS, MOST_STATES, MOST_UNITS, STEPS
 from islands.evolution.search_result import SearchResult
 from islands.evolution.settings import LATENT
@@ -216,7 +215,6 @@ def _describe_latent_search(settings: Mapping[str, Any], generations: int) -> di
     return {
         **settings,
         "generations": generations,
-        "orders": list(map(str, ORDERS)),
         "most_states": MOST_STATES,
         "most_units": MOST_UNITS,
         "structure_summary": STRUCTURE_SUMMARIES[settings["structure"]],

@@ -93,6 +93,16 @@ def test_parameters_in_the_units_of_the_record_give_its_signals():
     assert scales.use_scaled_units(layout, measured) == pytest.approx(theta)
 
 
+def test_a_dead_time_moves_the_inputs_within_their_recording():
+    data = make_latent_data(join([spring_record(700), spring_record(300, seed=3)]))
+    late = data.delay((4,))
+    for block, same in zip(late.used, data.used, strict=True):
+        assert np.array_equal(block.y, same.y)
+        assert np.array_equal(block.u[4:], same.u[:-4])
+        assert np.all(block.u[:4] == same.u[0])
+    assert data.delay((0,)) is data
+
+
 def test_many_recordings_are_used_in_part():
     data = make_latent_data(join([spring_record(1600, seed=seed) for seed in range(20)]))
     assert len(data.used) == 10

@@ -37,6 +37,7 @@ def test_inputs_that_are_read_early_are_read_at_sample_k():
     assert "0.02*u_V(k-1)" in model.equation().named
     assert "0.7*u_V(k)" in direct.equation().named
     assert direct.reads_at_once
+    assert not replace(direct, input_names=("u_V",), delays=(1,)).reads_at_once
     with pytest.raises(ModelError, match="one sample early"):
         replace(direct, input_names=("u_V",))
 

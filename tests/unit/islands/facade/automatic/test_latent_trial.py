@@ -69,7 +69,7 @@ def test_a_saturation_between_lags_is_latent():
     )
     # The steps of the trial are those of the choice, not of the search.
     trial = "preset auto: trial of latent models"
-    assert f"{trial}, linear state space of order 2" in messages
+    assert f"{trial}, linear model of order 2" in messages
     assert all(each.startswith(trial) for each in messages[messages.index(trial) :])
     sentence, dead_time = choice.reasons
     assert "Preset auto chose latent (state spaces with static curves)" in sentence
