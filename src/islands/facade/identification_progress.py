@@ -82,7 +82,7 @@ def identification_phases(
     evaluations = settings.population * settings.islands * (settings.generations + 1)
     if settings.model_class == LATENT:
         searched = (
-            Phase("linear model of order", 0.5 + 5e-5 * samples, 5),
+            Phase("linear model of order", 1.0 + 5e-5 * samples, 15),
             Phase(SEARCH, estimate_state_space_seconds(samples) * evaluations),
             Phase("final estimation of state spaces", 0.1 + _BANDS * samples),
             Phase("assessment of the models", 0.3),
