@@ -23,7 +23,7 @@ finally:
 LIMITS = {
     "--version": (280, ""),
     "fit --help": (715, ""),
-    "inspect {record}": (635, ""),
+    "inspect {record}": (1095, "numba scipy"),
     "jobs --help": (900, ""),
     "jobs show --url http://127.0.0.1:9": (850, ""),
     "show {model}": (610, ""),

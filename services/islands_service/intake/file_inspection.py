@@ -209,7 +209,7 @@ def _measure(
     There are no facts without a choice or a sampling; the reason of the choice then says why. All are empty
     if the file has no record.
     """
-    from islands.facade.inspect_record import inspect_table  # noqa: PLC0415
+    from islands.facade.inspect_table import inspect_table  # noqa: PLC0415
     from islands.records.inspection.record_facts import MOST_SAMPLES  # noqa: PLC0415
     from islands.records.reading.row_range import parse_rows  # noqa: PLC0415
 

@@ -34,7 +34,7 @@ PROGRAMS: Mapping[str, Callable[[], None]] = {
 #: Modules that the programs import when they run, so that the API does not import them. Those of single
 #: formats are left out: they would double the memory of this process.
 _PRELOADED = (
-    "islands.facade.inspect_record",
+    "islands.facade.inspect_table",
     "islands.records.inspection.record_facts",
     "islands.records.reading.column_names",
     "islands.records.reading.preview",

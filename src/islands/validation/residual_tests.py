@@ -73,6 +73,14 @@ class CorrelationTest:
     label: str
     note: str = ""
 
+    @property
+    def probability(self) -> float:
+        """Probability that a true model has a value at least as large at one of the counted lags."""
+        samples = (1.96 / self.band) ** 2
+        counted = self.values[1:] if self.name == "xi_xi" else self.values
+        one_lag = 2.0 * float(scipy.special.ndtr(-math.sqrt(samples) * np.abs(counted).max()))
+        return join_probabilities(one_lag, len(counted))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualTests:
@@ -102,6 +110,11 @@ class _Signal:
 
     values: NDArray[np.float64]
     name: str
+
+
+def join_probabilities(least: float, count: int) -> float:
+    """Return the probability that the least of independent probabilities is at most the given one (Sidak)."""
+    return 1.0 if least >= 1.0 else -math.expm1(count * math.log1p(-least))
 
 
 def residual_tests(residual: NDArray[np.float64], u: NDArray[np.float64], max_lag: int = 25) -> ResidualTests:

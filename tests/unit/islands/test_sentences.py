@@ -37,6 +37,21 @@ def choice(**details):
 
 RESTS = [fact(inputs=inputs, motion=(0.1, 0.02)) for inputs in (("u",), ("u", "v"))]
 
+LINEAR = [
+    {
+        "order": 2,
+        "error": 0.3,
+        "output_unit": "V",
+        "share": 0.02,
+        "dead_times": late,
+        "signal": "u",
+        "depends_on_amplitude": each,
+        "is_certain": each,
+        "probability": 1e-6,
+    }
+    for late, each in product(([], [("u", 0.3), ("v", 2.0)]), (True, False))
+]
+
 #: Facts with which each statement about a record is written.
 RECORD = {
     "not_computed": [fact(reason="the record is empty")],
@@ -65,6 +80,8 @@ RECORD = {
     **{f"drift_{each}": [fact()] for each in ("short", "missing", "none", "visible")},
     "rate_oversampled": [fact(is_noisy=each) for each in (True, False)],
     **{f"rate_{each}": [fact()] for each in ("unconnected", "low", "suitable")},
+    "linear_constant": [fact()],
+    **{f"linear_{each}": [fact(**values) for values in LINEAR] for each in ("within", "disturbed", "not")},
     **{
         f"choice_{each}": [choice()]
         for each in ("given", "too_short", "no_input", "no_output", "no_response")

@@ -196,14 +196,21 @@ def _extend_to(signals: Signals, fits: Sequence[Fit], steps: Steps) -> list[Fit]
 
 def _take_part(signals: Signals) -> Signals:
     """Return the signals, of a long record consecutive samples where the inputs vary most."""
-    if signals.samples <= _PART:
-        return signals
-    begins = range(0, signals.samples - _PART + 1, _PART)
-    spreads = [
-        float(np.log(signals.u[:, begin : begin + _PART].var(axis=1) + 1e-12).sum()) for begin in begins
-    ]
+    return signals if signals.samples <= _PART else signals.keep(*find_part(signals.u))
+
+
+def find_part(u: Signal) -> tuple[int, int]:
+    """Return the first sample of the part on which structures are searched, and the one after its last.
+
+    Parameters
+    ----------
+    u : ndarray, shape (inputs, samples)
+        With equal units.
+    """
+    begins = range(0, max(1, u.shape[1] - _PART + 1), _PART)
+    spreads = [float(np.log(u[:, begin : begin + _PART].var(axis=1) + 1e-12).sum()) for begin in begins]
     begin = begins[int(np.argmax(spreads))]
-    return signals.keep(begin, begin + _PART)
+    return begin, min(begin + _PART, u.shape[1])
 
 
 def _take_distant(fits: Sequence[Fit]) -> list[Fit]:

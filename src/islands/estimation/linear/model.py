@@ -77,6 +77,8 @@ class LinearModel:
     covariance : ndarray, shape (parameters, parameters)
     candidates : tuple of LinearCandidate
         Best model of every order.
+    residual : ndarray, shape (outputs, samples)
+        Error of the free run of the recordings, NaN where it is not counted.
     """
 
     a: Signal
@@ -97,6 +99,7 @@ class LinearModel:
     parameters: Signal
     covariance: Signal
     candidates: tuple[LinearCandidate, ...]
+    residual: Signal
 
     @property
     def order(self) -> int:
@@ -187,6 +190,9 @@ def make_model(
     )
     b, d, drift, level = (np.array(each) for each in zip(*parts, strict=True))
     degrees = np.maximum(fit.counts - len(theta) / outputs, 1.0)
+    residual = np.full(signals.y.shape, np.nan)
+    for begin, end in structure.find_intervals(signals):
+        residual[:, begin:end] = fit.residual[:, begin:end] * scales.y_unit[:, None]
     return LinearModel(
         a,
         b,
@@ -206,6 +212,7 @@ def make_model(
         theta,
         best.covariance,
         tuple(candidates),
+        residual,
     )
 
 

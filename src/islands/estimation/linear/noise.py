@@ -10,6 +10,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from islands.kernels.linear_filter import filter_linearly
+
 Signal = NDArray[np.float64]
 
 #: Noise without colour.
@@ -95,3 +97,9 @@ def _invert(moving: Signal, largest: float) -> Signal:
     zeros *= np.minimum(1.0, 0.999 * largest / np.maximum(np.abs(zeros), 1e-12))
     inside: Signal = np.atleast_1d(np.poly(zeros)).real[1:]
     return inside
+
+
+def whiten(residual: Signal, noise: Signal) -> Signal:
+    """Return the white noise behind the residual of a recording; see `Structure.noise`."""
+    past, white = noise
+    return np.asarray(filter_linearly([1.0, *-past], [1.0, *white], residual), np.float64)

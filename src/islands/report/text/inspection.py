@@ -23,6 +23,7 @@ _TITLES = {
     "coverage": "excitation",
     "excitation-order": "excitation",
     "sampling-time": "rate",
+    "linear": "linear",
 }
 
 #: Width of the column of titles.
