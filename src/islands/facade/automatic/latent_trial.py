@@ -80,7 +80,7 @@ def compare_latent(
         f"{percent(errors[LATENT])} of the output range of the estimation data, compared with "
         f"{percent(errors[choice.kind])} for {choice.kind}."
     )
-    return replace(compared, kind=LATENT, delays=(), reasons=(reason, "Dead times are states of the model."))
+    return replace(compared, kind=LATENT, delays=(), reasons=(reason, "Dead times are those of the linear model, or states."))
 
 
 def _is_better(latent: Assessment, chosen: Assessment) -> bool:

@@ -73,7 +73,7 @@ def test_a_saturation_between_lags_is_latent():
     assert all(each.startswith(trial) for each in messages[messages.index(trial) :])
     sentence, dead_time = choice.reasons
     assert "Preset auto chose latent (state spaces with static curves)" in sentence
-    assert dead_time == "Dead times are states of the model."
+    assert dead_time == "Dead times are those of the linear model, or states."
     found = identify_record(record, preset=choice, **SHORT)
     assert found.settings["choice"]["kind"] == "latent"
     assert choice_from_document(found.settings["choice"]) == choice
