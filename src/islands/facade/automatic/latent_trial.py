@@ -80,7 +80,8 @@ def compare_latent(
         f"{percent(errors[LATENT])} of the output range of the estimation data, compared with "
         f"{percent(errors[choice.kind])} for {choice.kind}."
     )
-    return replace(compared, kind=LATENT, delays=(), reasons=(reason, "Dead times are those of the linear model, or states."))
+    late = "Dead times are those of the linear model, or states."
+    return replace(compared, kind=LATENT, delays=(), reasons=(reason, late))
 
 
 def _is_better(latent: Assessment, chosen: Assessment) -> bool:
