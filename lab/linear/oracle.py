@@ -5,7 +5,7 @@ import numpy as np
 from islands.estimation.linear.identify import scale_signals
 from islands.estimation.linear.model import LinearModel, make_model
 from islands.estimation.linear.noise import WHITE
-from islands.estimation.linear.regression import Structure, minimise, project
+from islands.estimation.linear.regression import make_structure, minimise, project
 from lab.linear.plants import Trial
 
 
@@ -15,7 +15,7 @@ def fit_from_truth(trial: Trial) -> LinearModel:
     plant = trial.plant
     delays = plant.delays[None]
     # What the inputs were before the record, the identification does not know either.
-    structure = Structure(plant.sections, 0, delays, np.zeros(delays.shape, bool), (WHITE,), before=None)
+    structure = make_structure(plant.sections, 0, delays, np.zeros(delays.shape, bool), (WHITE,), before=None)
     start = project(signals, structure)
     assert start is not None
     return make_model(signals, minimise(signals, start, 50, 1e-6), scales, ())

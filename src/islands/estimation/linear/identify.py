@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from operator import attrgetter
 
 import numpy as np
@@ -11,8 +12,17 @@ from threadpoolctl import threadpool_limits
 from islands.errors import RecordError
 from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
 from islands.estimation.linear.noise import WHITE, fit_noises
-from islands.estimation.linear.regression import Fit, Structure, minimise, project
-from islands.estimation.linear.sections import INTEGRATORS, Signal, Signals, find_poles, pair_poles
+from islands.estimation.linear.reduction import Reduced, reduce_model, sample_fit, sample_high_order
+from islands.estimation.linear.regression import (
+    Fit,
+    Mode,
+    Structure,
+    make_structure,
+    minimise,
+    predict,
+    project,
+)
+from islands.estimation.linear.sections import INTEGRATORS, Signal, Signals, find_poles
 from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
 from islands.progress import Steps
 
@@ -36,6 +46,15 @@ _SMALL = 2
 
 #: Steps to the levels of inputs before a recording. The error of given numerators is linear in them.
 _LEVEL_STEPS = 3
+
+#: Transfer functions that are minimised, and their largest order.
+_REDUCED, _REDUCED_ORDER = 8, 8
+
+#: Steps after each of which the better half of the starts is left, and starts that are left at the end.
+_HALVINGS, _KEPT = (1, 2, 4, 8), 2
+
+#: Time constants in samples of a further pole in series.
+_SERIES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 
 #: Changes of a structure that are minimised, those of the least criterion first.
 _NEIGHBOURS = 8
@@ -187,10 +206,12 @@ def _extend_to(signals: Signals, fits: Sequence[Fit], steps: Steps) -> list[Fit]
     for fit in fits:
         steps(f"linear model of order {fit.structure.order} of all samples")
         # The inputs before the part are not those before the recordings.
-        before = None if fit.structure.before is None else signals.first
-        start = project(signals, replace(fit.structure, before=before))
-        if start is not None:
-            found.append(minimise(signals, start, 20, 1e-2))
+        structure = fit.structure
+        begins = [structure] if structure.before is None else []
+        begins += [replace(structure, before=signals.first, rests=rests) for rests in (False, True)]
+        starts = [each for each in (project(signals, begin) for begin in begins) if each]
+        if starts:
+            found.append(minimise(signals, min(starts, key=attrgetter("criterion")), 20, 1e-2))
     return found
 
 
@@ -240,16 +261,57 @@ class Search:
         """Return the best fit of every order that was reached."""
         shape = len(self.signals.y), len(self.signals.u)
         self.high = fit_high_order(self.signals, self.longest, self.feedthrough)
-        static = Structure(
+        static = make_structure(
             (), 0, np.zeros(shape, np.int64), np.ones(shape, bool), (WHITE,) * shape[0], self.signals.first
         )
         self._keep(self._fit([static]))
         for order in range(1, min(_SMALL, self.max_order) + 1):
             self.steps(f"linear model of order {order}")
             self._keep(self._fit(list(self._starts(order))))
-        for fit in self._reduce():
-            self._keep(self._colour(fit))
-        return self._grow()
+        if self.high is not None:
+            response = sample_high_order(self.signals, self.high)
+            orders = range(1, min(self.max_order, _REDUCED_ORDER) + 1)
+            self._keep_reduced(list(reduce_model(response, orders)))
+        self._grow()
+        best = self.best.structure
+        orders = range(max(best.order - 2, 1), min(best.order + 1, self.max_order) + 1)
+        if best.order > 1:
+            self._keep_reduced(list(reduce_model(sample_fit(self.best), orders, best.integrators)))
+        return [self.fits[order] for order in sorted(self.fits)]
+
+    def _keep_reduced(self, reduced: Iterable[Reduced]) -> None:
+        """Keep the most promising fits that begin with transfer functions."""
+        unit = float(np.log(self.signals.samples)) * self.best.structure.delays.size
+        promising = sorted(reduced, key=lambda each: each.loss + unit * (each.order + each.zeros))[:_REDUCED]
+        starts = [start for each in promising for start in self._list_starts(each)]
+        fits = [each for each in (project(self.signals, start) for start in starts) if each]
+        if fits and not any(noise.size for noise in self.best.structure.noise):
+            # Without the noise, poles of a closed loop would move away from the consistent ones.
+            noise = self._list_noises(min(fits, key=attrgetter("criterion")))[0]
+            coloured = [project(self.signals, replace(start, noise=noise)) for start in starts]
+            fits += [each for each in coloured if each]
+        for steps in _HALVINGS:
+            fits = [minimise(self.signals, each, steps, 1e-2) for each in fits]
+            fits = sorted(fits, key=attrgetter("criterion"))[: max(len(fits) // 2, _KEPT)]
+        for fit in fits[:_KEPT]:
+            self.steps(f"linear model of order {fit.structure.order}")
+            self._keep(self._colour(self._move_delays(fit)))
+
+    def _list_starts(self, reduced: Reduced) -> Iterator[Structure]:
+        """Yield structures from rest or not, with whole dead times or a fraction of a sample."""
+        best, shape = self.best.structure, self.best.structure.delays.shape
+        every = np.ones(shape, bool)
+        # A direct path is no response of the modes.
+        direct = ~every if self.high is None else self.high.leads
+        modes = [Mode(complex(np.exp(pole)), every) for pole in reduced.poles if pole.imag >= 0.0]
+        integrators = np.ones((*shape, min(reduced.integrators, 1)), bool)
+        bare = replace(best, sections=(), integrators=reduced.integrators, drives=integrators)
+        excess = np.where(direct, 1, reduced.order - reduced.zeros)
+        delays = np.where(direct, 0, reduced.delays)
+        for leads in (direct, every):
+            start = bare.take(modes, excess=excess, delays=delays + (leads & ~direct), leads=leads)
+            yield replace(start, rests=True, before=self.signals.first)
+            yield replace(start, rests=False)
 
     @property
     def best(self) -> Fit:
@@ -262,36 +324,18 @@ class Search:
             order = fit.structure.order
             self.fits[order] = min(self.fits.get(order, fit), fit, key=attrgetter("criterion"))
 
-    def _reduce(self) -> list[Fit]:
-        """Return the two most promising fits that begin with the ARX model."""
-        if self.high is None:
-            return []
-        found = []
-        for order in range(_SMALL + 1, min(self.max_order, self.high.vectors.shape[1]) + 1):
-            self.steps(f"linear model of order {order}")
-            structure = self._extend(self.best.structure, self.high.find_poles(order), self.high)
-            start = project(self.signals, structure)
-            # Without the noise, poles of a closed loop would move away from the consistent ones.
-            start = start and project(self.signals, replace(structure, noise=self._list_noises(start)[0]))
-            if start is not None:
-                found.append(minimise(self.signals, start, 6, 1.0))
-        return sorted(found, key=attrgetter("criterion"))[:2]
-
-    def _grow(self) -> list[Fit]:
+    def _grow(self) -> None:
         """Add orders after the best one as long as one of a few reduces the criterion."""
         order = self.best.structure.order
         while order < min(self.max_order, self.best.structure.order + _PATIENCE):
             order += 1
             self.steps(f"linear model of order {order}")
             self._keep(self._fit(list(self._starts(order))))
-        return [self.fits[order] for order in sorted(self.fits)]
 
     def _starts(self, order: int) -> Iterator[Structure]:
-        """Yield structures of an order: of the ARX model, and smaller ones with further poles."""
+        """Yield structures of an order: smaller ones with further poles."""
         samples = self.signals.samples
         smaller, smallest = self.fits.get(order - 1), self.fits.get(order - 2)
-        if self.high is not None and order <= self.high.vectors.shape[1]:
-            yield self._extend(self.best.structure, self.high.find_poles(order), self.high)
         if smaller is not None:
             for pole in grid_real(samples):
                 yield self._extend(smaller.structure, pole)
@@ -299,23 +343,21 @@ class Search:
             for pair in grid_pairs(samples):
                 yield self._extend(smallest.structure, pair)
 
-    def _extend(
-        self, structure: Structure, poles: Iterable[complex], high: HighOrder | None = None
-    ) -> Structure:
-        """Return a structure with further poles, or with those of the ARX model and its dead times."""
-        kept, kind = (find_poles(structure.sections), structure.integrators) if high is None else ((), 0)
+    def _extend(self, structure: Structure, poles: Iterable[complex]) -> Structure:
+        """Return a structure with further poles."""
         delays, leads = structure.delays, structure.leads
         if structure.order == 0:
             # The response begins at the lag that the gain reads.
             leads = (delays == 0) & self.feedthrough
             delays = np.maximum(delays - 1, 0)
-        if high is not None:
-            delays, leads = high.delays, leads & (high.delays > 0) | high.leads
-        noise = (WHITE,) * len(structure.noise)
-        sections = tuple(pair_poles([*kept, *poles]))
+        every = np.ones(delays.shape, bool)
+        modes = [Mode(complex(pole), every) for pole in poles if np.imag(pole) >= 0.0]
         # Of a transient, a small model without its first samples would be a free decay.
         before = self.signals.first if structure.order < _SMALL else structure.before
-        return Structure(sections, kind, delays, leads, noise, before)
+        noise = (WHITE,) * len(structure.noise)
+        return structure.take(
+            [*structure.modes, *modes], delays=delays, leads=leads, noise=noise, before=before
+        )
 
     def _fit(self, structures: Sequence[Structure]) -> Fit | None:
         """Return the best fit that the most promising structures lead to."""
@@ -334,7 +376,7 @@ class Search:
             self.steps(f"changes of the linear model of order {fit.structure.order}")
             improved, rivals = False, []
             tried = [project(self.signals, each) for each in self._list_neighbours(fit)]
-            for start in sorted(filter(None, tried), key=attrgetter("criterion"))[:_NEIGHBOURS]:
+            for start in sorted(filter(None, tried), key=partial(predict, self.signals))[:_NEIGHBOURS]:
                 found = minimise(self.signals, start, 15, 0.1)
                 # An order that is too large hides a wrong dead time, and wrong inputs before the recordings.
                 if found.structure.order < fit.structure.order:
@@ -346,43 +388,101 @@ class Search:
         return fit, rivals
 
     def _list_neighbours(self, fit: Fit) -> Iterator[Structure]:
-        """Yield smaller structures, and others of integrators, dead times and inputs before a recording."""
+        """Yield structures with one change."""
         structure = fit.structure
+        white = (WHITE,) * len(structure.noise)
         for before in self._list_before(fit):
-            yield replace(structure, before=before)
-        poles, white = find_poles(structure.sections), (WHITE,) * len(structure.noise)
+            yield replace(structure, before=before, rests=structure.rests and before is not None)
         if any(noise.size for noise in structure.noise):
             yield replace(structure, noise=white)
-        modes = [pole for pole in poles if pole.imag >= 0.0]
-        for mode in sorted(modes, key=abs):
-            left = [pole for pole in poles if pole not in (mode, mode.conjugate())]
-            smaller = replace(structure, sections=tuple(pair_poles(left)))
+        if structure.order == 0:
+            return
+        yield replace(structure, rests=not structure.rests, before=self.signals.first)
+        yield from self._list_smaller(structure)
+        yield from self._list_integrators(structure)
+        yield from self._list_larger(structure)
+        yield from self._list_numerators(structure)
+        yield from self._list_delays(structure)
+
+    def _list_smaller(self, structure: Structure) -> Iterator[Structure]:
+        """Yield structures without a mode."""
+        modes = structure.modes
+        for place, mode in enumerate(modes):
+            left = [*modes[:place], *modes[place + 1 :]]
+            size = 2 if mode.pole.imag > 0.0 else 1
+            smaller = structure.take(left)
             yield smaller
+            if (structure.excess > 1).any():
+                yield replace(smaller, excess=np.maximum(structure.excess - size * mode.drives, 1))
             # A mode may describe the response to other inputs before the recordings.
             if structure.before is not None and structure.delays.any():
-                yield replace(smaller, before=None)
+                yield replace(smaller, before=None, rests=False)
             # With a pole near 0, an order reads the lags of the order below and a fraction.
             if left:
                 delays = structure.delays + ~structure.leads
                 yield replace(smaller, leads=np.ones_like(structure.leads), delays=delays)
-        slowest = min(modes, key=lambda pole: abs(pole - 1.0), default=0.0)
-        integrators = structure.integrators + (2 if slowest.imag > 0.0 else 1)
-        if modes and integrators < len(INTEGRATORS):
-            left = [pole for pole in poles if pole not in (slowest, slowest.conjugate())]
-            integrating = replace(structure, sections=tuple(pair_poles(left)), integrators=integrators)
-            yield from (integrating, replace(integrating, noise=white))
-        if structure.order == 0:
-            return
+
+    def _list_integrators(self, structure: Structure) -> Iterator[Structure]:
+        """Yield structures with an integrator in place of the slowest mode, and the other way round."""
+        modes = structure.modes
+        if structure.integrators:
+            bare = replace(structure, integrators=0, drives=structure.drives[:, :, :-1])
+            # With a pole that is nearly 1, the output has a level.
+            slow = Mode(complex(np.exp(-2.0 / self.signals.samples)), structure.drives[:, :, -1])
+            yield bare.take([*modes, *[slow] * structure.integrators])
+            yield replace(bare, excess=np.maximum(structure.excess - structure.integrators, 1))
+        place = min(range(len(modes)), key=lambda each: abs(modes[each].pole - 1.0), default=0)
+        count = structure.integrators + (2 if modes and modes[place].pole.imag > 0.0 else 1)
+        if modes and count < len(INTEGRATORS):
+            bare = structure.take([*modes[:place], *modes[place + 1 :]])
+            driven = structure.drives.any(axis=2) if structure.integrators else modes[place].drives
+            drives = np.dstack([bare.drives[:, :, : len(bare.sections)], driven])
+            integrating = replace(bare, integrators=count, drives=drives)
+            yield from (integrating, replace(integrating, noise=(WHITE,) * len(structure.noise)))
+
+    def _list_larger(self, structure: Structure) -> Iterator[Structure]:
+        """Yield structures with a further real pole in series, in place of a part of the dead time or not."""
+        every = np.ones(structure.delays.shape, bool)
+        for time in _SERIES if structure.order < self.max_order else ():
+            mode = Mode(complex(np.exp(-1.0 / time)), every)
+            larger = structure.take([*structure.modes, mode], excess=structure.excess + 1)
+            yield larger
+            least = np.minimum(structure.delays, structure.leads)
+            yield replace(larger, delays=np.maximum(structure.delays - round(time), least))
+
+    def _list_numerators(self, structure: Structure) -> Iterator[Structure]:
+        """Yield structures with more or fewer zeros, and modes in the response to more or fewer inputs."""
+        excess = structure.excess
+        orders = np.repeat(structure.drives, [part.size for part in structure.parts], axis=2).sum(axis=2)
+        for zeros in range(max(structure.order - 1, 0)):
+            yield replace(structure, excess=np.maximum(orders - zeros, 1))
+        for place in np.ndindex(excess.shape):
+            for change in (-1, 1):
+                if excess.size > 1 and 1 <= excess[place] + change <= orders[place]:
+                    moved = excess.copy()
+                    moved[place] += change
+                    yield replace(structure, excess=moved)
+            for section in range(len(structure.parts) if excess.size > 1 else 0):
+                drives = structure.drives.copy()
+                drives[(*place, section)] = not drives[(*place, section)]
+                if drives[:, :, section].any():
+                    size = structure.parts[section].size * (1 if drives[(*place, section)] else -1)
+                    moved = excess.copy()
+                    moved[place] = max(1, int(moved[place]) + size)
+                    yield from (replace(structure, drives=drives, excess=each) for each in (excess, moved))
+
+    def _list_delays(self, structure: Structure) -> Iterator[Structure]:
+        """Yield structures with other dead times."""
         for place in np.ndindex(structure.delays.shape):
-            for change in (-1, 1, -structure.delays[place]):
+            for change in (-1, 1, -int(structure.delays[place])):
                 delays = structure.delays.copy()
                 delays[place] += change
                 if self._is_causal(structure.leads, delays):
                     yield replace(structure, delays=delays)
-            for change in (-1,) if structure.leads[place] else (0, 1):
+            for change in (-1, 0) if structure.leads[place] else (0, 1):
                 leads, delays = structure.leads.copy(), structure.delays.copy()
                 leads[place] = not leads[place]
-                delays[place] += max(change, 0)
+                delays[place] += change
                 if self._is_causal(leads, delays):
                     yield replace(structure, leads=leads, delays=delays)
 
@@ -419,8 +519,9 @@ class Search:
                     moved = self._with_delay(fit, output, place, delay)
                     if moved is None:
                         continue
-                    moved = minimise(self.signals, moved, 4, 2.0, fit.deviance)
-                    if moved.deviance < fit.deviance - 1e-3:
+                    cost = moved.criterion - moved.deviance
+                    moved = minimise(self.signals, moved, 4, 2.0, fit.criterion - cost)
+                    if moved.criterion < fit.criterion - 1e-3:
                         fit, improved = moved, True
         return fit
 
@@ -439,7 +540,8 @@ class Search:
     def _choose_before(self, fit: Fit) -> Fit:
         """Return the fit with the inputs before the recordings of the least criterion."""
         for before in self._list_before(fit):
-            start = project(self.signals, replace(fit.structure, before=before))
+            rests = fit.structure.rests and before is not None
+            start = project(self.signals, replace(fit.structure, before=before, rests=rests))
             if start is not None:
                 fit = min(fit, minimise(self.signals, start, 8, 0.1), key=attrgetter("criterion"))
         return fit

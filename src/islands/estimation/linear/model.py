@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.estimation.linear.regression import Fit, Structure, linearise, move
+from islands.estimation.linear.regression import Fit, Structure, linearise, map_parameters, move
 from islands.estimation.linear.sections import Section, Signal, Signals, find_poles
 from islands.kernels.state_space import simulate_state_space
 from islands.models.state_space import INTEGRATOR_GAINS, Quantity, StateSpace, measure_mode
@@ -233,8 +233,10 @@ def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _MeasuredQuantities
     covariance, outputs = estimate_covariance(signals, fit), range(len(fit.coefficients))
 
     def measure(values: Signal) -> list[list[Quantity]]:
-        sections, coefficients = _unpack(values, fit)
-        moved = replace(fit.structure, sections=sections)
+        found = _unpack(values, fit)
+        if found is None:
+            return [[] for _ in outputs]
+        moved, coefficients = found
         return [list(_measure(moved, coefficients[output], output, scales)) for output in outputs]
 
     theta = _pack(fit)
@@ -263,6 +265,8 @@ def estimate_covariance(signals: Signals, fit: Fit) -> Signal:
     The coordinates of the poles are those of `regression.differentiate`.
     """
     factors, free = linearise(signals, fit), fit.structure.free
+    if factors is None:
+        return np.full((len(_pack(fit)), len(_pack(fit))), np.nan)
     size = sum(each.own for each in factors) + free
     information, at = np.zeros((size, size)), 0
     for each, squares, count in zip(factors, fit.squares, fit.counts, strict=True):
@@ -281,16 +285,31 @@ def estimate_covariance(signals: Signals, fit: Fit) -> Signal:
 
 
 def _pack(fit: Fit) -> Signal:
-    own = [np.concatenate([c, n.ravel()]) for c, n in zip(fit.coefficients, fit.structure.noise, strict=True)]
-    return np.concatenate([*own, np.zeros(fit.structure.free)])
+    structure, parts = fit.structure, []
+    for output, own in enumerate(fit.parameters):
+        fractions = structure.fractions[output, structure.find_early(output)]
+        parts += [own, structure.noise[output].ravel(), fractions]
+    return np.concatenate([*parts, np.zeros(structure.free)])
 
 
-def _unpack(values: Signal, fit: Fit) -> tuple[tuple[Section, ...], list[Signal]]:
-    coefficients, at = [], 0
-    for own, noise in zip(fit.coefficients, fit.structure.noise, strict=True):
-        coefficients.append(values[at : at + own.size])
-        at += own.size + noise.size
-    return move(fit.structure.sections, values[at:]), coefficients
+def _unpack(values: Signal, fit: Fit) -> tuple[Structure, list[Signal]] | None:
+    """Return the structure and the coefficients; None if a pole has no continuous time."""
+    structure, own, at = fit.structure, list[Signal](), 0
+    fractions = structure.fractions.copy()
+    for output, parameters in enumerate(fit.parameters):
+        own.append(values[at : at + parameters.size])
+        at += parameters.size + structure.noise[output].size
+        early = structure.find_early(output)
+        fractions[output, early] = values[at : at + early.size]
+        at += early.size
+    moved = replace(structure, sections=move(structure.sections, values[at:]), fractions=fractions)
+    mappings = [map_parameters(moved, output, fit.signals.samples) for output in range(len(own))]
+    coefficients = []
+    for output, (mapping, parameters) in enumerate(zip(mappings, own, strict=True)):
+        if mapping is None:
+            return None
+        coefficients.append(mapping[-structure.count_coefficients(output) :] @ parameters)
+    return moved, coefficients
 
 
 def _propagate(
@@ -400,7 +419,11 @@ def _measure(structure: Structure, own: Signal, output: int, scales: Scales) -> 
             found.append(Quantity(name, growth, input=place + 1))
         else:
             found.append(Quantity("static gain", float(gain), input=place + 1))
-        late = structure.delays[output, place] - _find_lead(structure, b[:, place], d[place])
+        if place in structure.find_early(output):
+            lead = float(structure.fractions[output, place])
+        else:
+            lead = _find_lead(structure, b[:, place], d[place])
+        late = structure.delays[output, place] - lead
         found.append(Quantity("dead time", float(late) * scales.dt, "s", place + 1))
     return found
 

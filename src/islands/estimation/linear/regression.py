@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.linear.noise import limit_zeros
+from islands.estimation.linear.numerators import find_rest, map_numerators
 from islands.estimation.linear.sections import (
     INTEGRATORS,
     Section,
@@ -34,6 +35,24 @@ _NEGLIGIBLE = 1e-3
 
 #: Halvings of a step.
 _MAX_HALVINGS = 8
+
+#: Part by which poles and dead times are moved for the derivatives of numerators.
+_MOVED = 1e-5
+
+
+class Mode(NamedTuple):
+    """A real pole or a complex pair.
+
+    Attributes
+    ----------
+    pole : complex
+        Of a pair, that with the positive imaginary part.
+    drives : ndarray of bool, shape (outputs, inputs)
+        Whether it is in the response of an output to an input.
+    """
+
+    pole: complex
+    drives: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +74,14 @@ class Structure:
     before : ndarray, shape (recordings, inputs), optional
         Values of the inputs before every recording. If they are not known, outputs that read them are not
         counted.
+    drives : ndarray of bool, shape (outputs, inputs, sections)
+        Whether a section, last that of the integrators, is in the response of an output to an input.
+    excess : ndarray of int64, shape (outputs, inputs)
+        Poles of the response in continuous time less its zeros. If it is 1, all numerators are free.
+    fractions : ndarray, shape (outputs, inputs)
+        Part of a sample by which a response that leads begins earlier; a parameter with fewer zeros.
+    rests : bool
+        Whether every recording begins at rest with the inputs before it.
     """
 
     sections: tuple[Section, ...]
@@ -63,6 +90,10 @@ class Structure:
     leads: NDArray[np.bool_]
     noise: tuple[Signal, ...]
     before: Signal | None
+    drives: NDArray[np.bool_]
+    excess: NDArray[np.int64]
+    fractions: Signal
+    rests: bool = False
 
     @property
     def skipped(self) -> int:
@@ -100,6 +131,68 @@ class Structure:
         """Number of poles that are estimated."""
         return self.order - self.integrators
 
+    @property
+    def modes(self) -> list[Mode]:
+        """All modes but the integrators."""
+        return [
+            Mode(pole, self.drives[:, :, place])
+            for place, section in enumerate(self.sections)
+            for pole in find_poles([section]).tolist()
+            if pole.imag >= 0.0
+        ]
+
+    def take(self, modes: Sequence[Mode], **changes: Any) -> "Structure":
+        """Return the structure with other modes; real poles share a section with those of the same inputs."""
+        sections, drives = [], []
+        groups = {mode.drives.tobytes(): mode.drives for mode in modes}
+        for key, driven in groups.items():
+            poles = [mode.pole for mode in modes if mode.drives.tobytes() == key]
+            own = pair_poles([*poles, *(pole.conjugate() for pole in poles if pole.imag > 0.0)])
+            sections += own
+            drives += [driven] * len(own)
+        drives += [self.drives[:, :, place] for place in range(len(self.sections), len(self.parts))]
+        every = np.stack(drives, axis=2) if drives else np.ones((*self.delays.shape, 0), bool)
+        return replace(self, **{"sections": tuple(sections), "drives": every, **changes})
+
+    def is_free(self, output: int) -> bool:
+        """Return whether all coefficients and initial states of an output are parameters."""
+        return bool((self.excess[output] == 1).all() and self.drives[output].all() and not self.rests)
+
+    def find_tied(self, output: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the places of initial states that follow from the inputs before, and of the others."""
+        first, order = self.noise[output].shape[1], self.order
+        places = np.arange(first + order)
+        is_tied = (places >= first) & (places < first + self.free) & self.rests
+        return places[is_tied], places[~is_tied]
+
+    @property
+    def whole(self) -> NDArray[np.int64]:
+        """Whole samples of the dead times, shape (outputs, inputs)."""
+        return np.maximum(self.delays - (self.leads & (self.order > 0)), 0)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the inputs before the recording hold the output of an integrator."""
+        return self.rests and self.integrators > 0 and self.before is not None and len(self.before) == 1
+
+    def find_early(self, output: int) -> NDArray[np.int64]:
+        """Return the inputs for which the fraction of the dead time is a parameter."""
+        return np.flatnonzero(self.leads[output] & (self.excess[output] > 1))
+
+
+def make_structure(
+    sections: tuple[Section, ...],
+    integrators: int,
+    delays: NDArray[np.int64],
+    leads: NDArray[np.bool_],
+    noise: tuple[Signal, ...],
+    before: Signal | None,
+) -> Structure:
+    """Return the structure with free numerators of all sections, and free initial states."""
+    drives = np.ones((*delays.shape, len(sections) + min(integrators, 1)), bool)
+    excess, fractions = np.ones_like(delays), np.full(delays.shape, 0.5)
+    return Structure(sections, integrators, delays, leads, noise, before, drives, excess, fractions)
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -109,9 +202,11 @@ class Fit:
     ----------
     signals : Signals
     structure : Structure
+    parameters : tuple of ndarray
+        Linear parameters of every output: of every input the coefficients of the sections and, if it leads,
+        of the direct term, or those of the numerator in continuous time; last the constant.
     coefficients : tuple of ndarray
-        Coefficients of every output: of every input those of the sections and, if it leads, of the direct
-        term; last the constant.
+        The coefficients that follow.
     states : tuple of ndarray
         States of the noise and of the sections of every output at the first sample that is counted, shape
         (recordings, states).
@@ -123,6 +218,7 @@ class Fit:
 
     signals: Signals
     structure: Structure
+    parameters: tuple[Signal, ...]
     coefficients: tuple[Signal, ...]
     states: tuple[Signal, ...]
     squares: Signal
@@ -168,30 +264,186 @@ class Fit:
     def criterion(self) -> float:
         """Information criterion of Schwarz, with the initial states and a dead time as parameters."""
         structure, samples = self.structure, self.signals.samples
-        sizes = [each.size for each in (*self.coefficients, *structure.noise, *self.starts)]
-        count = structure.free + sum(sizes) + int(np.count_nonzero(structure.delays))
+        sizes = [each.size for each in (*self.parameters, *structure.noise)]
+        sizes += [structure.find_early(output).size for output in range(len(structure.noise))]
+        free = structure.integrators if structure.rests else structure.order
+        sizes += [len(self.starts) * self.signals.ends.size * free]
+        count = structure.free + sum(sizes) + int(np.count_nonzero(structure.whole))
         return self.deviance + float(np.log(samples)) * count
 
 
 def project(signals: Signals, structure: Structure) -> Fit | None:
-    """Return the fit with the best numerators; None if it is not finite or its noise not invertible."""
+    """Return the fit with the best numerators.
+
+    None if it is not finite, its noise not invertible, or numerators need the continuous time of a pole that
+    has none.
+    """
     if not all(is_invertible(each, signals.samples) for each in structure.noise):
         return None
-    recordings, coefficients, states = signals.ends.size, [], []
+    recordings, parameters, coefficients, states = signals.ends.size, [], [], []
     squares = np.empty(len(structure.noise))
     for output, noise in enumerate(structure.noise):
+        mapping = map_parameters(structure, output, signals.samples)
+        if mapping is None:
+            return None
         zero = np.zeros(structure.count_coefficients(output))
-        factor, own = _factor(
-            signals, structure, output, zero, np.zeros((recordings, noise.shape[1] + structure.order))
+        starts = np.zeros((recordings, noise.shape[1] + structure.order))
+        tied, untied = structure.find_tied(output)
+        equations, own, norms = _map_columns(
+            *_factor(signals, structure, output, zero, starts), _append(mapping, np.eye(1)), tied, untied
         )
-        found = solve(factor[:, :-1], factor[:, -1], _measure_columns(factor, own)[:-1])
+        found = solve(equations[:, :-1], equations[:, -1], norms[:-1])
+        values = mapping @ found.values
+        starts[:, tied] = values[: -zero.size].reshape(recordings, tied.size)
+        starts[:, untied] = [_solve_states(rows, found.values) for rows in own]
         squares[output] = found.squares
-        coefficients.append(found.values)
-        states.append(np.array([_solve_states(rows, found.values) for rows in own]))
+        parameters.append(found.values)
+        coefficients.append(values[-zero.size :])
+        states.append(starts)
     if not np.isfinite(squares).all():
         return None
     counts = np.full(squares.size, float(signals.samples - structure.skipped * recordings))
-    return Fit(signals, structure, tuple(coefficients), tuple(states), squares, counts)
+    return Fit(signals, structure, tuple(parameters), tuple(coefficients), tuple(states), squares, counts)
+
+
+def map_parameters(structure: Structure, output: int, samples: int) -> Signal | None:
+    """Return what tied states and coefficients of an output are for its linear parameters.
+
+    Returns
+    -------
+    ndarray, shape (recordings * tied + coefficients, parameters), optional
+        None if numerators need the continuous time of a pole that has none.
+    """
+    mapping = _map_points(structure, output, samples, [structure])
+    return None if mapping is None else mapping[0]
+
+
+def _map_points(
+    structure: Structure, output: int, samples: int, points: Sequence[Structure]
+) -> Signal | None:
+    """Return the mappings of structures that differ in poles and fractions, as the first axis."""
+    blocks = [_map_input(structure, output, place, points) for place in range(structure.delays.shape[1])]
+    kept = [block for block in blocks if block is not None]
+    if len(kept) < len(blocks):
+        return None
+    levels = np.zeros((0, len(kept)))
+    if structure.rests and structure.before is not None:
+        levels = structure.before
+    rests = [_list_rests(each) if structure.rests else [] for each in points]
+    tied = len(levels) * structure.free
+    rows, columns = (sum(block.shape[axis] for block in kept) + 1 for axis in (1, 2))
+    mapping = np.zeros((len(points), tied + rows, columns))
+    row = column = 0
+    for block, level in zip(kept, levels.T, strict=True):
+        taken = slice(column, column + block.shape[2])
+        mapping[:, tied + row : tied + row + block.shape[1], taken] = block
+        for point, own in enumerate(rests):
+            for at, rest in own:
+                states = rest @ block[point, at : at + len(rest)]
+                for recording, value in enumerate(level):
+                    first = recording * structure.free + at
+                    mapping[point, first : first + len(rest), taken] = value * states
+        if structure.holds:
+            # The constant of an integrator is its growth over the record.
+            mapping[:, -1, taken] = -samples * level[0] * block[:, structure.free]
+        row, column = row + block.shape[1], column + block.shape[2]
+    if structure.holds:
+        return mapping[:, :, :-1]
+    mapping[:, -1, -1] = 1.0
+    return mapping
+
+
+def _append(one: Signal, other: Signal) -> Signal:
+    """Return a matrix of two blocks on the diagonal."""
+    joined = np.zeros((len(one) + len(other), one.shape[1] + other.shape[1]))
+    joined[: len(one), : one.shape[1]], joined[len(one) :, one.shape[1] :] = one, other
+    return joined
+
+
+def _list_rests(structure: Structure) -> list[tuple[int, Signal]]:
+    """Return the first row of every section, and its states at rest."""
+    ends = np.cumsum([section.size for section in structure.sections])
+    return [
+        (int(end) - section.size, find_rest(section))
+        for end, section in zip(ends, structure.sections, strict=True)
+    ]
+
+
+def _map_input(structure: Structure, output: int, place: int, points: Sequence[Structure]) -> Signal | None:
+    """Return what the coefficients of an input are for its parameters, of structures near each other."""
+    leads, excess = bool(structure.leads[output, place]), int(structure.excess[output, place])
+    drives = structure.drives[output, place]
+    sizes = [part.size for part in structure.parts]
+    rows = np.repeat(drives, sizes)
+    if excess > 1 and rows.any():
+        early = np.array([each.fractions[output, place] for each in points]) if leads else None
+        poles = np.array([find_poles(each.parts) for each in points])[:, rows]
+        driven = [size for size, is_driven in zip(sizes, drives, strict=True) if is_driven]
+        own = map_numerators(poles, driven, max(int(rows.sum()) - excess, 0), early)
+        if own is None:
+            return None
+    else:
+        own = np.repeat(np.eye(int(rows.sum()) + leads)[None], len(points), axis=0)
+    if rows.all():
+        return own
+    block = np.zeros((len(points), structure.order + leads, own.shape[2]))
+    block[:, np.append(rows, np.ones(int(leads), bool))] = own
+    return block
+
+
+def differentiate_mapping(
+    structure: Structure, output: int, samples: int, parameters: Signal
+) -> Signal | None:
+    """Return the derivatives of tied states and coefficients by the fractions of dead times and by the poles.
+
+    Returns
+    -------
+    ndarray, shape (recordings * tied + coefficients, fractions + poles), optional
+    """
+    points, steps = list[Structure](), list[float]()
+    for place in structure.find_early(output):
+        change = np.zeros_like(structure.fractions)
+        change[output, place] = _MOVED
+        points += [replace(structure, fractions=structure.fractions + sign * change) for sign in (1.0, -1.0)]
+        steps.append(_MOVED)
+    least = [min(1.0 + float(each.sum()), abs(float(each[-1]))) for each in structure.sections for _ in each]
+    for place, step in enumerate(least):
+        change = _MOVED * step * np.eye(1, structure.free, place)[0]
+        sides = [move(structure.sections, sign * change) for sign in (1.0, -1.0)]
+        points += [replace(structure, sections=sections) for sections in sides]
+        steps.append(_MOVED * step)
+    if not points:
+        return np.zeros((structure.count_coefficients(output), 0))
+    mapping = _map_points(structure, output, samples, points)
+    if mapping is None:
+        return None
+    every = mapping @ parameters
+    slopes: Signal = (every[::2] - every[1::2]) / (2.0 * np.array(steps)[:, None])
+    return slopes.T
+
+
+def _map_columns(
+    factor: Signal, own: Signal, mapping: Signal, tied: NDArray[np.int64], untied: NDArray[np.int64]
+) -> tuple[Signal, Signal, Signal]:
+    """Return equations in the parameters, rows of the states that are not tied, and norms of the columns."""
+    recordings, order = own.shape[:2]
+    kept = mapping[recordings * tied.size :]
+    starts = mapping[: recordings * tied.size].reshape(recordings, tied.size, mapping.shape[1])
+    equations = factor @ kept
+    columns = own[:, :, order:] @ kept + own[:, :, tied] @ starts
+    norms = np.sqrt(np.square(equations).sum(axis=0) + np.square(columns).sum(axis=(0, 1)))
+    own = np.concatenate([own[:, :, untied], columns], axis=2)
+    if tied.size:
+        own = np.array(
+            [
+                np.linalg.qr(
+                    np.vstack([rows, np.zeros((max(rows.shape[1] - order, 0), rows.shape[1]))]), mode="r"
+                )
+                for rows in own
+            ]
+        )
+        equations = np.vstack([equations, *own[:, untied.size :, untied.size :]])
+    return equations, own[:, : untied.size], norms
 
 
 def _factor(
@@ -231,13 +483,6 @@ def _run(signals: Signals, structure: Structure, output: int, *rest: Any) -> Non
     )
 
 
-def _measure_columns(factor: Signal, own: Signal) -> Signal:
-    """Return the norms of the columns over all samples."""
-    order = own.shape[1]
-    norms: Signal = np.sqrt(np.square(factor).sum(axis=0) + np.square(own[:, :, order:]).sum(axis=(0, 1)))
-    return norms
-
-
 def _solve_states(rows: Signal, coefficients: Signal) -> Signal:
     """Return the initial states of a recording."""
     order = len(rows)
@@ -272,6 +517,8 @@ def solve(rows: Signal, moment: Signal, units: Signal | None = None) -> Solution
 class OutputFactor(NamedTuple):
     """Triangular factor of one output: its own parameters first, then the poles, then the error.
 
+    Its own parameters are the linear ones, those of the noise, and fractions of dead times.
+
     The coordinates of a section of two coefficients are ``a1 + a2`` and ``-a2``.
     """
 
@@ -279,40 +526,64 @@ class OutputFactor(NamedTuple):
     own: int
 
 
-def linearise(signals: Signals, fit: Fit) -> list[OutputFactor]:
-    """Return the factors of every output at a fit."""
-    return [
-        OutputFactor(
-            _factor(signals, fit.structure, output, coefficients, states, derivatives=True)[0],
-            coefficients.size + fit.structure.noise[output].size,
-        )
-        for output, (coefficients, states) in enumerate(zip(fit.coefficients, fit.states, strict=True))
-    ]
+def linearise(signals: Signals, fit: Fit) -> list[OutputFactor] | None:
+    """Return the factors of every output at a fit; None if a pole has no continuous time."""
+    found = []
+    for output, (parameters, coefficients, states) in enumerate(
+        zip(fit.parameters, fit.coefficients, fit.states, strict=True)
+    ):
+        structure = fit.structure
+        rows = _factor(signals, structure, output, coefficients, states, derivatives=True)
+        noise, (tied, untied) = structure.noise[output].size, structure.find_tied(output)
+        early = structure.find_early(output).size
+        if structure.is_free(output):
+            found.append(OutputFactor(rows[0], parameters.size + noise))
+            continue
+        matrix = map_parameters(structure, output, signals.samples)
+        slopes = differentiate_mapping(structure, output, signals.samples, parameters)
+        if matrix is None or slopes is None:
+            return None
+        # The rows are tied states, coefficients, noise, poles and the error.
+        rest = np.eye(noise + structure.free + 1)
+        rest = np.insert(rest, [noise] * early, 0.0, axis=1)
+        mapping = _append(matrix, rest)
+        mapping[: len(matrix), matrix.shape[1] + noise : -1] = slopes
+        equations = _map_columns(*rows, mapping, tied, untied)[0]
+        factor = np.asarray(np.linalg.qr(equations, mode="r"))
+        found.append(OutputFactor(factor, parameters.size + noise + early))
+    return found
 
 
 class _Step(NamedTuple):
-    """Changes of the poles and of the noise of every output, and the deviance that they lead to if linear."""
+    """Changes of poles, noise and fractions of dead times, and the deviance that they lead to if linear."""
 
     poles: Signal
     noise: list[Signal]
+    fractions: Signal
     deviance: float
 
 
-def _find_step(signals: Signals, fit: Fit) -> _Step:
-    """Return the Gauss-Newton step."""
-    factors, free = linearise(signals, fit), fit.structure.free
+def _find_step(signals: Signals, fit: Fit) -> _Step | None:
+    """Return the Gauss-Newton step; None if it is not finite."""
+    factors, structure = linearise(signals, fit), fit.structure
+    if factors is None:
+        return None
+    free, fractions = structure.free, np.zeros_like(structure.fractions)
     deviations = np.sqrt(np.maximum(fit.squares / fit.counts, np.finfo(float).tiny))
     shared = np.vstack(
         [each.factor[each.own :, each.own :] / s for each, s in zip(factors, deviations, strict=True)]
     )
     poles = solve(shared[:, :free], shared[:, free]).values
     noise, squares = [], []
-    for each, before in zip(factors, fit.structure.noise, strict=True):
+    for output, (each, before) in enumerate(zip(factors, structure.noise, strict=True)):
         moment = each.factor[:, -1] - each.factor[:, each.own : -1] @ poles
         own = solve(each.factor[: each.own, : each.own], moment[: each.own])
-        noise.append(own.values[each.own - before.size :].reshape(before.shape))
+        count = fit.parameters[output].size
+        noise.append(own.values[count : count + before.size].reshape(before.shape))
+        fractions[output, structure.find_early(output)] = own.values[count + before.size :]
         squares.append(own.squares + float(moment[each.own :] @ moment[each.own :]))
-    return _Step(poles, noise, fit.measure_deviance(np.array(squares)))
+    deviance = fit.measure_deviance(np.array(squares))
+    return _Step(poles, noise, fractions, deviance) if np.isfinite(deviance) else None
 
 
 def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
@@ -320,11 +591,16 @@ def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
     structure = fit.structure
     for halving in range(_MAX_HALVINGS):
         scale = 0.5**halving
-        sections = _join_neighbours(move(structure.sections, scale * step.poles))
+        sections = move(structure.sections, scale * step.poles)
         noise = tuple([old + scale * new for old, new in zip(structure.noise, step.noise, strict=True)])
-        if not all(map(is_stable, sections)):
+        # A dead time passes smoothly from one sample to the next.
+        fractions = structure.fractions + scale * step.fractions
+        whole = np.floor(fractions).astype(np.int64)
+        delays = structure.delays - whole
+        if not all(map(is_stable, sections)) or (delays < np.minimum(structure.delays, 1)).any():
             continue
-        found = project(signals, replace(structure, sections=sections, noise=noise))
+        moved = replace(structure, sections=sections, noise=noise, delays=delays, fractions=fractions - whole)
+        found = project(signals, _join_neighbours(moved))
         if found is not None and found.deviance < fit.deviance:
             return found
     return None
@@ -342,10 +618,10 @@ def move(sections: Sequence[Section], moved: Signal) -> tuple[Section, ...]:
     return tuple(found)
 
 
-def _join_neighbours(sections: Sequence[Section]) -> tuple[Section, ...]:
+def _join_neighbours(structure: Structure) -> Structure:
     """Return sections of neighbouring real poles, so that a double pole stays in one of them."""
-    poles = find_poles(sections)
-    return tuple(pair_poles(poles)) if np.count_nonzero(poles.imag == 0.0) > 2 else tuple(sections)
+    real = np.count_nonzero(find_poles(structure.sections).imag == 0.0)
+    return structure.take(structure.modes) if real > 2 else structure
 
 
 def is_invertible(noise: Signal, samples: int) -> bool:
@@ -360,6 +636,8 @@ def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: 
     """
     for _ in range(steps):
         step = _find_step(signals, fit)
+        if step is None:
+            break
         expected = fit.deviance - step.deviance
         if expected < min(least, _NEGLIGIBLE) or fit.deviance - 2.0 * expected > goal:
             break
@@ -370,3 +648,9 @@ def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: 
         if gain < least:
             break
     return fit
+
+
+def predict(signals: Signals, fit: Fit) -> float:
+    """Return the information criterion after a step, if the response were linear in it."""
+    step = _find_step(signals, fit)
+    return fit.criterion if step is None else fit.criterion - max(fit.deviance - step.deviance, 0.0)

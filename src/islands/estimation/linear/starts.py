@@ -1,9 +1,7 @@
-"""Initial poles and dead times of linear models: a high-order ARX model with Hankel reduction, and a grid.
+"""Starts of linear models: a high-order ARX model, and a grid of poles.
 
-An ARX model of high order is consistent for any noise and in closed loop. The singular vectors of the Hankel
-matrix of its impulse response have the poles of every order (Ho and Kalman 1966; Kung 1978). Of a transient,
-such as one step, ARX models are not determined; the grid covers the time constants and frequencies that the
-record can show.
+An ARX model of high order is consistent for any noise and in closed loop. Of a transient, such as one step,
+it is not determined; the grid covers the time constants and frequencies that the record can show.
 """
 
 from dataclasses import dataclass
@@ -13,10 +11,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from islands.estimation.linear.sections import BLOCK, Signal, Signals
-from islands.kernels.linear_filter import divide_rows
 
-#: Lags of the output of the ARX model, samples for each of its parameters, and lags of the impulse response.
-_LAGS, _SAMPLES_PER_PARAMETER, _RESPONSE = 40, 4, 240
+#: Lags of the output of the ARX model, and samples for each of its parameters.
+_LAGS, _SAMPLES_PER_PARAMETER = 40, 4
+
+#: Part of the largest singular value below which a sum of squares has lost the others.
+_PRECISION = 1e-7
 
 #: Standard errors from which a coefficient ends the dead time.
 _SIGNIFICANT = 4.0
@@ -32,24 +32,14 @@ class HighOrder:
         Samples before the first significant coefficient, less one; not less than 0.
     leads : ndarray of bool, shape (outputs, inputs)
         Whether the first significant coefficient is that of the same sample.
-    vectors : ndarray, shape (lags times outputs, orders)
-        Left singular vectors of the Hankel matrix of the impulse responses.
-    outputs : int
+    polynomials : list of (tuple of ndarray)
+        Of every output: the denominator, the numerators of the inputs from lag 0 on, shape (inputs, lags),
+        and the variance of the error.
     """
 
     delays: NDArray[np.int64]
     leads: NDArray[np.bool_]
-    vectors: Signal
-    outputs: int
-
-    def find_poles(self, order: int) -> NDArray[np.complex128]:
-        """Return the stable poles of an order; those outside of the unit circle are reflected."""
-        kept = self.vectors[:, :order]
-        a = np.linalg.lstsq(kept[: -self.outputs], kept[self.outputs :], rcond=None)[0]
-        poles = np.linalg.eigvals(a).astype(np.complex128)
-        outside = np.abs(poles) >= 0.99999
-        poles[outside] = 0.9999 * poles[outside] / np.abs(poles[outside])
-        return poles
+    polynomials: list[tuple[Signal, Signal, float]]
 
 
 def fit_high_order(signals: Signals, largest_delay: int, feedthrough: bool = False) -> HighOrder | None:
@@ -69,7 +59,7 @@ def fit_high_order(signals: Signals, largest_delay: int, feedthrough: bool = Fal
     reach = min(lags + largest_delay, share)
     if lags < 2:
         return None
-    direct, responses = int(feedthrough), []
+    direct, polynomials = int(feedthrough), list[tuple[Signal, Signal, float]]()
     first, delays = (np.zeros((outputs, inputs), np.int64) for _ in range(2))
     for output in range(outputs):
         factor = _triangulate(signals, output, lags, reach, direct)
@@ -77,7 +67,7 @@ def fit_high_order(signals: Signals, largest_delay: int, feedthrough: bool = Fal
         norms = np.linalg.norm(factor[:, :count], axis=0)
         norms[norms == 0.0] = 1.0
         u, s, vt = np.linalg.svd(factor[:, :count] / norms)
-        kept = s > 1e-10 * s[0]
+        kept = s > _PRECISION * s[0]
         moment = (u.T @ factor[:, count])[:count]
         theta = (vt[kept].T @ (moment[kept] / s[kept])) / norms
         rest = factor[:, count] - factor[:, :count] @ theta
@@ -87,26 +77,9 @@ def fit_high_order(signals: Signals, largest_delay: int, feedthrough: bool = Fal
         significant = np.abs(numerators) > _SIGNIFICANT * errors[lags:-1].reshape(inputs, reach)
         first[output] = np.where(significant.any(axis=1), significant.argmax(axis=1), direct)
         delays[output] = np.clip(first[output] - direct, 0, largest_delay)
-        # The response to the same sample is no response of the modes.
-        length = direct + _RESPONSE
-        pulses = np.zeros((inputs, length))
-        for place, delay in enumerate(delays[output]):
-            taken = min(reach - delay, length)
-            pulses[place, :taken] = numerators[place, delay : delay + taken]
-        responses.append(divide_rows(-theta[:lags], pulses, np.array([length]))[:, direct:])
-    response = np.array(responses)  # (outputs, inputs, lags)
-    if not np.isfinite(response).all() or np.abs(response).max() > 1e6:
-        return None
-    return HighOrder(delays, first < direct, _find_vectors(response), outputs)
-
-
-def _find_vectors(response: Signal) -> Signal:
-    """Return the left singular vectors of the Hankel matrix of responses (outputs, inputs, lags)."""
-    outputs, inputs, samples = response.shape
-    half = samples // 2
-    windows = sliding_window_view(response, half, axis=2)[:, :, :half]  # (outputs, inputs, half, half)
-    hankel = windows.transpose(2, 0, 1, 3).reshape(half * outputs, inputs * half)
-    return np.asarray(np.linalg.svd(hankel, full_matrices=False)[0])
+        numerators = np.hstack([np.zeros((inputs, 1 - direct)), numerators])
+        polynomials.append((np.append(1.0, -theta[:lags]), numerators, variance))
+    return HighOrder(delays, first < direct, polynomials)
 
 
 def _triangulate(signals: Signals, output: int, lags: int, reach: int, direct: int) -> Signal:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.estimation.linear.regression import Structure, linearise, minimise, move, project
+from islands.estimation.linear.regression import linearise, make_structure, minimise, move, project
 from islands.estimation.linear.sections import Signals
 
 
@@ -15,11 +15,21 @@ def signals():
     return Signals(u, random.normal(size=(1, 300)), ends)
 
 
-@pytest.fixture
-def structure(signals):
+@pytest.fixture(params=["free", "mapped"])
+def structure(request, signals):
+    """Return free numerators, or fewer zeros, a mode that one input does not drive, and a start at rest."""
+    found = make_free_structure(signals)
+    if request.param == "free":
+        return found
+    drives = np.array([[[True, True, True], [True, False, True]]])
+    return replace(found, excess=np.array([[3, 2]]), drives=drives, rests=True)
+
+
+def make_free_structure(signals):
     sections = np.array([-1.5, 0.8]), np.array([-0.9])
     leads = np.array([[True, False]])
-    return Structure(sections, 1, np.array([[2, 0]]), leads, (np.array([[0.5], [0.3]]),), signals.first)
+    noise = (np.array([[0.5], [0.3]]),)
+    return make_structure(sections, 1, np.array([[2, 0]]), leads, noise, signals.first)
 
 
 def test_squares_are_those_of_the_white_noise_and_of_its_state_before_a_recording(signals, structure):
@@ -34,14 +44,14 @@ def test_squares_are_those_of_the_white_noise_and_of_its_state_before_a_recordin
 
 
 def test_error_is_orthogonal_to_the_coefficients_of_the_best_fit(signals, structure):
-    (found,) = linearise(signals, project(signals, structure))
-    columns, count = found.factor, found.own - 2
+    fit = project(signals, structure)
+    columns, count = linearise(signals, fit)[0].factor, fit.parameters[0].size
     moments = columns[:, :count].T @ columns[:, -1]
     np.testing.assert_allclose(moments / np.linalg.norm(columns[:, :count], axis=0), 0.0, atol=1e-10)
 
 
 def test_outputs_that_read_inputs_before_a_recording_are_not_counted(signals, structure):
-    structure = replace(structure, before=None)
+    structure = replace(structure, before=None, rests=False)
     fit = project(signals, structure)
     assert (fit.residual[0, [0, 1, 140, 141]] == 0.0).all()
     signals.y[0, [0, 1, 140, 141]] = 1e3

@@ -1,0 +1,212 @@
+"""Transfer functions of few zeros in continuous time near a model, by weighted iterations.
+
+The equation error of a transfer function, divided by the denominator of the iteration before, is linear in
+the coefficients (Sanathanan & Koerner 1963). Partial fractions of the poles before keep it well conditioned
+(Gustavsen & Semlyen 1999). The weights are those of the deviance that the difference of the models costs.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.estimation.linear.regression import Fit
+from islands.estimation.linear.sections import Signal, Signals
+from islands.estimation.linear.starts import HighOrder
+
+Spectrum = NDArray[np.complexfloating[Any, Any]]
+
+#: Frequencies that are taken one by one, and the part by which the others grow.
+_SINGLE, _GROWTH = 30, 0.03
+
+#: Samples by which the dead times are shorter than those of the model.
+_EARLIER = (-6, -4, -2, -1, 0, 1, 2, 3, 5, 8, 12, 20)
+
+#: Iterations.
+_ITERATIONS = 5
+
+
+class Reduced(NamedTuple):
+    """A transfer function near a model.
+
+    Attributes
+    ----------
+    poles : ndarray
+        In continuous time and samples, without integrators.
+    loss : float
+        Increase of the deviance that is expected.
+    integrators, zeros : int
+    delays : ndarray of int64, shape (outputs, inputs)
+    """
+
+    poles: Spectrum
+    loss: float
+    integrators: int
+    zeros: int
+    delays: NDArray[np.int64]
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return self.poles.size + self.integrators
+
+
+class Response(NamedTuple):
+    """Frequency response of a model, and what its difference to another one costs.
+
+    Attributes
+    ----------
+    frequencies : ndarray
+        In radians for each sample.
+    values : ndarray, shape (outputs, inputs, frequencies)
+    weights : ndarray, shape (outputs, inputs, frequencies)
+        The squares of weighted differences add up to a deviance.
+    delays : ndarray of int64, shape (outputs, inputs)
+        Dead times near those of the process.
+    """
+
+    frequencies: Signal
+    values: Spectrum
+    weights: Signal
+    delays: NDArray[np.int64]
+
+
+def reduce_model(response: Response, orders: Iterable[int], integrators: int = 0) -> Iterator[Reduced]:
+    """Yield a transfer function for each order and number of zeros."""
+    frequencies = response.frequencies
+    s = 1j * frequencies
+    # In units of the integrators, and of the input that is held.
+    held = (1.0 - np.exp(-s)) / s
+    target = response.values / held * s**integrators * np.exp(s * response.delays[:, :, None])
+    weights = response.weights * np.abs(held) / frequencies**integrators
+    power = (np.square(weights) * np.abs(target) ** 2).sum(axis=(0, 1))
+    if not power.any() or not np.isfinite(power).all():
+        return
+    share = np.cumsum(power) / power.sum()
+    low, high = frequencies[np.searchsorted(share, [0.02, 0.98])]
+    for order in orders:
+        count = order - integrators
+        poles: Spectrum = -np.geomspace(max(low, 1e-4), 2.0 * max(high, low), count) + 0.0j
+        place = _EARLIER.index(0)
+        for zeros in range(order - 1):
+            found: dict[int, Reduced] = {}
+            # The loss has one minimum over the dead times near those of the model.
+            waiting = [place, place - 1, place + 1]
+            while waiting:
+                at = waiting.pop(0)
+                if at in found or not 0 <= at < len(_EARLIER):
+                    continue
+                delays = np.maximum(response.delays - _EARLIER[at], 0)
+                moved = target * np.exp(-s * (response.delays - delays)[:, :, None])
+                found[at] = Reduced(*_iterate(s, moved, weights, poles, zeros), integrators, zeros, delays)
+                place = min(found, key=lambda each: found[each].loss)
+                waiting += [
+                    each for each in (place - 1, place + 1) if each not in found and each not in waiting
+                ]
+            poles = found[place].poles
+            yield found[place]
+
+
+def sample_fit(fit: Fit) -> Response:
+    """Return the frequency response of a fit."""
+    structure = fit.structure
+    frequencies, power = _measure_inputs(fit.signals)
+    q = np.exp(-1j * frequencies)
+    values = np.zeros((*structure.delays.shape, frequencies.size), np.complex128)
+    weights = np.empty(values.shape)
+    for output, coefficients in enumerate(fit.coefficients):
+        at = 0
+        for place, delay in enumerate(structure.delays[output]):
+            for part in structure.parts:
+                own = coefficients[at : at + part.size]
+                numerator = own[0] * q if part.size == 1 else (own[0] + own[1]) * q - own[1] * q**2
+                values[output, place] += numerator / np.polyval([*part[::-1], 1.0], q)
+                at += part.size
+            if structure.leads[output, place]:
+                # A direct path is no response of the modes.
+                values[output, place] += coefficients[at] if delay else 0.0
+                at += 1
+            values[output, place] *= q**delay
+        past, moving = structure.noise[output]
+        noise = np.abs(np.polyval([*moving[::-1], 1.0], q) / np.polyval([*-past[::-1], 1.0], q)) ** 2
+        weights[output] = np.sqrt(power / (fit.squares[output] / fit.counts[output] * noise + 1e-300))
+    return Response(frequencies, values, weights, structure.delays)
+
+
+def sample_high_order(signals: Signals, high: HighOrder) -> Response:
+    """Return the frequency response of a high-order ARX model."""
+    frequencies, power = _measure_inputs(signals)
+    q, values, weights = np.exp(-1j * frequencies), [], []
+    for denominator, numerators, variance in high.polynomials:
+        divisor = np.polyval(denominator[::-1], q)
+        # A direct path is no response of the modes.
+        values.append([np.polyval(row[::-1], q) / divisor - row[0] for row in numerators])
+        weights.append(np.sqrt(power / (variance + 1e-300)) * np.abs(divisor))
+    return Response(frequencies, np.array(values), np.array(weights), high.delays)
+
+
+def _measure_inputs(signals: Signals) -> tuple[Signal, Signal]:
+    """Return frequencies, and the squares that a response of 1 to an input adds to the output."""
+    half = signals.samples // 2
+    edges = [*range(1, min(_SINGLE, half) + 1)]
+    while edges[-1] < half:
+        edges.append(max(edges[-1] + 1, round(edges[-1] * (1.0 + _GROWTH))))
+    edges = [edge for edge in edges if edge < half]
+    power = np.abs(np.fft.rfft(signals.u - signals.u[:, :1])[:, :half]) ** 2
+    bins = np.add.reduceat(np.arange(half), edges) / np.diff([*edges, half])
+    return 2.0 * np.pi / signals.samples * bins, 2.0 / signals.samples * np.add.reduceat(power, edges, axis=1)
+
+
+def _iterate(
+    s: Spectrum, target: Spectrum, weights: Signal, poles: Spectrum, zeros: int
+) -> tuple[Spectrum, float]:
+    """Return the best poles of some iterations, and the weighted square of the error that they leave."""
+    unit = float(np.exp(np.log(np.abs(poles) + 1e-12).mean()))
+    powers, wanted = (s / unit) ** np.arange(zeros + 1)[:, None], target * weights
+    best = poles, np.inf
+    for _ in range(_ITERATIONS + 1):
+        numerators = powers / np.prod((s - poles[:, None]) / unit, axis=0)
+        fractions, mix = _list_fractions(s, poles)
+        rows = []
+        for goal, weight in zip(wanted.reshape(-1, s.size), weights.reshape(-1, s.size), strict=True):
+            columns = _list_parts(weight * numerators)
+            basis = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
+            equations = _list_parts(np.vstack([goal * fractions, goal]))
+            rows.append(equations - basis @ (basis.T @ equations))
+        matrix = np.vstack(rows)
+        if not np.isfinite(matrix).all():
+            break
+        # The last column is the error with the numerators of these poles.
+        loss = float(matrix[:, -1] @ matrix[:, -1])
+        best = (poles, loss) if loss < best[1] else best
+        norms = np.linalg.norm(matrix, axis=0) + 1e-300
+        change = np.linalg.lstsq(matrix[:, :-1] / norms[:-1], -matrix[:, -1], rcond=1e-12)[0] / norms[:-1]
+        if not np.isfinite(change).all():
+            break
+        # The zeros of one plus the partial fractions.
+        moved = np.linalg.eigvals(np.diag(poles) - mix @ change)
+        real, pairs = moved[np.abs(moved.imag) < 1e-9].real, moved[moved.imag >= 1e-9]
+        pairs = np.column_stack([pairs, pairs.conj()]).ravel()
+        poles = np.concatenate([-np.abs(real), -np.abs(pairs.real) + 1j * pairs.imag])
+    return best
+
+
+def _list_parts(rows: Spectrum) -> Signal:
+    """Return the real parts of all columns, and the imaginary ones after them."""
+    return np.asarray(np.hstack([rows.real, rows.imag]).T, np.float64)
+
+
+def _list_fractions(s: Spectrum, poles: Spectrum) -> tuple[Spectrum, Spectrum]:
+    """Return real sums of partial fractions, shape (order, frequencies), and what they add up."""
+    mix, at = np.zeros((poles.size, poles.size), np.complex128), 0
+    while at < poles.size:
+        if poles[at].imag == 0.0:
+            mix[at, at] = 1.0
+            at += 1
+        else:
+            mix[at, at : at + 2] = 1.0, 1.0j
+            mix[at + 1, at : at + 2] = 1.0, -1.0j
+            at += 2
+    fractions = 1.0 / (s - poles[:, None])
+    return (mix.T @ fractions), mix
