@@ -23,6 +23,9 @@ _SINGLE, _GROWTH = 30, 0.03
 #: Samples by which the dead times are shorter than those of the model.
 _EARLIER = (-6, -4, -2, -1, 0, 1, 2, 3, 5, 8, 12, 20)
 
+#: Least damping ratio, so that no frequency is a pole.
+_LEAST_DAMPING = 1e-3
+
 #: Iterations.
 _ITERATIONS = 5
 
@@ -142,7 +145,8 @@ def sample_high_order(signals: Signals, high: HighOrder) -> Response:
         divisor = np.polyval(denominator[::-1], q)
         # A direct path is no response of the modes.
         values.append([np.polyval(row[::-1], q) / divisor - row[0] for row in numerators])
-        weights.append(np.sqrt(power / (variance + 1e-300)) * np.abs(divisor))
+        # Where an input has no power, the noise of the model may be much too small.
+        weights.append(np.sqrt(power / (variance + 1e-300)) * np.minimum(np.abs(divisor), 1.0))
     return Response(frequencies, np.array(values), np.array(weights), high.delays)
 
 
@@ -153,7 +157,10 @@ def _measure_inputs(signals: Signals) -> tuple[Signal, Signal]:
     while edges[-1] < half:
         edges.append(max(edges[-1] + 1, round(edges[-1] * (1.0 + _GROWTH))))
     edges = [edge for edge in edges if edge < half]
-    power = np.abs(np.fft.rfft(signals.u - signals.u[:, :1])[:, :half]) ** 2
+    # A window, as the jump from the end of a record to its beginning is not in the input.
+    window = np.hanning(signals.samples) * np.sqrt(8.0 / 3.0)
+    moving = signals.u - signals.u.mean(axis=1, keepdims=True)
+    power = np.abs(np.fft.rfft(window * moving)[:, :half]) ** 2
     bins = np.add.reduceat(np.arange(half), edges) / np.diff([*edges, half])
     return 2.0 * np.pi / signals.samples * bins, 2.0 / signals.samples * np.add.reduceat(power, edges, axis=1)
 
@@ -188,7 +195,10 @@ def _iterate(
         moved = np.linalg.eigvals(np.diag(poles) - mix @ change)
         real, pairs = moved[np.abs(moved.imag) < 1e-9].real, moved[moved.imag >= 1e-9]
         pairs = np.column_stack([pairs, pairs.conj()]).ravel()
-        poles = np.concatenate([-np.abs(real), -np.abs(pairs.real) + 1j * pairs.imag])
+        moved = np.concatenate([real, pairs])
+        poles = -np.maximum(np.abs(moved.real), _LEAST_DAMPING * np.abs(moved)) + 1j * moved.imag
+        if not poles.all():
+            break
     return best
 
 

@@ -16,7 +16,7 @@ from islands.estimation.linear.sections import BLOCK, Signal, Signals
 _LAGS, _SAMPLES_PER_PARAMETER = 40, 4
 
 #: Part of the largest singular value below which a sum of squares has lost the others.
-_PRECISION = 1e-7
+_PRECISION = 1e-6
 
 #: Standard errors from which a coefficient ends the dead time.
 _SIGNIFICANT = 4.0
