@@ -319,6 +319,8 @@ def _propagate(
     covariance: Signal,
 ) -> tuple[tuple[float, ...], ...]:
     """Return the standard errors of quantities by the delta method, along the axes of the covariance."""
+    if not np.isfinite(covariance).all():
+        return tuple((np.nan,) * len(own) for own in quantities)
     unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
     axes = (vectors * np.sqrt(np.maximum(values, 0.0))).T * unit

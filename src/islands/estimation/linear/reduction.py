@@ -192,7 +192,10 @@ def _iterate(
         if not np.isfinite(change).all():
             break
         # The zeros of one plus the partial fractions.
-        moved = np.linalg.eigvals(np.diag(poles) - mix @ change)
+        try:
+            moved = np.linalg.eigvals(np.diag(poles) - mix @ change)
+        except np.linalg.LinAlgError:  # The changes are so large that they overflow.
+            break
         real, pairs = moved[np.abs(moved.imag) < 1e-9].real, moved[moved.imag >= 1e-9]
         pairs = np.column_stack([pairs, pairs.conj()]).ravel()
         moved = np.concatenate([real, pairs])

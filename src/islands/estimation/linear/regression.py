@@ -275,10 +275,12 @@ class Fit:
 def project(signals: Signals, structure: Structure) -> Fit | None:
     """Return the fit with the best numerators.
 
-    None if it is not finite, its noise not invertible, or numerators need the continuous time of a pole that
-    has none.
+    None if it is not finite or not stable, its noise not invertible, or a pole has no continuous time that
+    numerators need.
     """
-    if not all(is_invertible(each, signals.samples) for each in structure.noise):
+    if not all(map(is_stable, structure.sections)) or not all(
+        is_invertible(each, signals.samples) for each in structure.noise
+    ):
         return None
     recordings, parameters, coefficients, states = signals.ends.size, [], [], []
     squares = np.empty(len(structure.noise))
@@ -597,7 +599,7 @@ def _take_step(signals: Signals, fit: Fit, step: _Step) -> Fit | None:
         fractions = structure.fractions + scale * step.fractions
         whole = np.floor(fractions).astype(np.int64)
         delays = structure.delays - whole
-        if not all(map(is_stable, sections)) or (delays < np.minimum(structure.delays, 1)).any():
+        if (delays < np.minimum(structure.delays, 1)).any():
             continue
         moved = replace(structure, sections=sections, noise=noise, delays=delays, fractions=fractions - whole)
         found = project(signals, _join_neighbours(moved))
