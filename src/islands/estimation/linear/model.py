@@ -174,12 +174,13 @@ def make_model(
     """Return the model of a fit in the units of the record, with standard errors.
 
     Rivals are fits of other structures. Those with the same modes add to the standard errors by the weight
-    that their criterion gives them (Hoeting et al. 1999).
+    that the deviance on another record gives them (Buckland, Burnham & Augustin 1997): a structure of fewer
+    parameters may have a bias that the criterion of Schwarz does not detect.
     """
     structure, outputs = fit.structure, len(fit.coefficients)
     best, theta = _estimate(signals, fit, scales), _pack(fit)
     others = [_estimate(signals, each, scales) for each in rivals]
-    weights = [np.exp(0.5 * (fit.criterion - each.criterion)) for each in rivals]
+    weights = [np.exp(0.5 * (fit.expected_deviance - each.expected_deviance)) for each in rivals]
     parts = [
         _realise(fit.coefficients[output], structure, output, scales, signals.samples)
         for output in range(outputs)

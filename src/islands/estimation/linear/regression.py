@@ -260,16 +260,25 @@ class Fit:
         levels = 0 if before is None else int(np.count_nonzero(before != first))
         return len(self.states) * len(first) * self.structure.skipped + levels
 
-    @property
-    def criterion(self) -> float:
-        """Information criterion of Schwarz, with the initial states and a dead time as parameters."""
-        structure, samples = self.structure, self.signals.samples
+    @cached_property
+    def count(self) -> int:
+        """Number of parameters, with the initial states and dead times."""
+        structure = self.structure
         sizes = [each.size for each in (*self.parameters, *structure.noise)]
         sizes += [structure.find_early(output).size for output in range(len(structure.noise))]
         free = structure.integrators if structure.rests else structure.order
         sizes += [len(self.starts) * self.signals.ends.size * free]
-        count = structure.free + sum(sizes) + int(np.count_nonzero(structure.whole))
-        return self.deviance + float(np.log(samples)) * count
+        return structure.free + sum(sizes) + int(np.count_nonzero(structure.whole))
+
+    @property
+    def criterion(self) -> float:
+        """Information criterion of Schwarz."""
+        return self.deviance + float(np.log(self.signals.samples)) * self.count
+
+    @property
+    def expected_deviance(self) -> float:
+        """Information criterion of Akaike: the deviance that is expected on another record."""
+        return self.deviance + 2.0 * self.count
 
 
 def project(signals: Signals, structure: Structure) -> Fit | None:
