@@ -117,7 +117,8 @@ def _follows_noise(signals: list[_Signal], place: int, rows: list[NDArray[np.int
 def _regress(columns: list[_Signal], target: _Signal) -> tuple[_Signal, _Signal, _Signal]:
     """Return the weights of least squares, the residual, and a factor of the covariance of the weights."""
     matrix = np.column_stack(columns)
-    upper = np.linalg.qr(np.column_stack([matrix, target]), mode="r")[: matrix.shape[1]]
+    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, target]), mode="r"), dtype=np.float64)
+    upper = triangle[: matrix.shape[1]]
     left, sizes, right = np.linalg.svd(upper[:, :-1])
     kept = sizes > _RANK * sizes[0]
     factor = right[kept].T / sizes[kept]
