@@ -127,7 +127,7 @@ class ParametricModel(ABC):
 
     @property
     def free_size(self) -> int:
-        """Number of parameters that the response determines: all of them, unless coordinates are among them."""
+        """Number of parameters that the response determines; all of them, unless some are coordinates."""
         return self.size
 
     @property
