@@ -23,8 +23,8 @@ from islands.records.inspection.findings import InspectedColumn, InspectedSampli
 from islands.records.inspection.gross_errors import find_input_codes
 from islands.records.inspection.record_facts import RecordFacts, measure_facts
 from islands.records.inspection.record_note import MOST_ROWS, RecordNote, make_note
-from islands.records.inspection.static_curve import describe_static_curve, is_static_curve
 from islands.records.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
+from islands.records.inspection.static_curve import describe_static_curve, is_static_curve
 from islands.records.reading.column_names import find_column, split_structures
 from islands.records.reading.open_table import exclude_gross_errors, read_table
 from islands.records.reading.options import DEFAULT_READING, EXCLUDE, KEEP, ROWS, SAMPLE, ReadingOptions
