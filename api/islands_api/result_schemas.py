@@ -189,7 +189,9 @@ class LinearSystemView(ResponseModel):
     """Linear system of a model about an operating point, whose signals are deviations from it."""
 
     schema_version: Literal["islands.linear-system/1"] = Field(alias="schema")
-    dt: float | None = Field(description="Sampling time in seconds; null if the model states none.")
+    dt: float | None = Field(
+        description="Sampling time in seconds; 0 of a continuous system, null if unknown."
+    )
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     input_units: tuple[str, ...]
@@ -208,12 +210,14 @@ class LinearSystemView(ResponseModel):
         description="A row for each output, a column for each input; null with an integrator."
     )
     words: tuple[str, ...] = Field(description="Time constants, resonances, dead times and gains.")
-    A: tuple[tuple[float, ...], ...] | None = Field(default=None, description="x(k+1) = A x(k) + B u(k-d)")
+    A: tuple[tuple[float, ...], ...] | None = Field(
+        default=None, description="x(k+1) = A x(k) + B u(k-d); of a continuous system dx/dt."
+    )
     B: tuple[tuple[float, ...], ...] | None = None
     C: tuple[tuple[float, ...], ...] | None = Field(default=None, description="y(k) = C x(k) + D u(k-d)")
     D: tuple[tuple[float, ...], ...] | None = None
     numerators: tuple[tuple[tuple[float, ...], ...], ...] | None = Field(
         default=None,
-        description="Of a transfer function, by output and input, the highest power of z first.",
+        description="Of a transfer function, by output and input, the highest power of z, or of s, first.",
     )
     denominator: tuple[float, ...] | None = Field(default=None, description="Common to all of them.")

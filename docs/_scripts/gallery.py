@@ -40,9 +40,9 @@ def draw(axes: Axes, name: str, result: islands.Result) -> None:
     axes.plot(time, measured, color=MEASURED, lw=MEASURED_WIDTH, label="measured")
     axes.plot(time, run, color=SIMULATED, lw=2 * SIMULATED_WIDTH, label="simulated")
     error = best.metrics["validation"]["free_run"].mape
-    axes.set_title(
-        f"{name}: {best.model.size} terms, free-run error {error:.2g} % of the range", fontsize=8.0
-    )
+    model = best.model
+    size = f"{model.size} terms" if isinstance(model, islands.Model) else f"order {best.linearise().order}"
+    axes.set_title(f"{name}: {size}, free-run error {error:.2g} % of the range", fontsize=8.0)
     axes.set_ylabel(label(record.output_name, record.output_unit))
     axes.set_xlim(float(np.min(time)), float(np.max(time)))
     axes.set_xlabel("time (s)")

@@ -312,6 +312,7 @@ def linear_system(
     rank: int = 1,
     at: Mapping[str, float] | None = None,
     form: str = FORMS[0],
+    continuous: str | None = None,
 ) -> RequestSpec[LinearSystemView]:
     """Return the linear system of a model about an operating point.
 
@@ -324,8 +325,10 @@ def linear_system(
         point of a latent model, and the middle of the ranges of the data of others.
     form : str
         ``state-space`` or ``transfer-function``.
+    continuous : str, optional
+        ``zoh`` or ``tustin``: the system in continuous time, as of `StateSpace.to_continuous`.
     """
-    params = {"at": _write_levels(at), "form": form}
+    params = _write_request(at, form, continuous)
     return RequestSpec("GET", _linear_path(which, rank), read_as(LinearSystemView), params=params)
 
 
@@ -335,9 +338,10 @@ def export_linear_system(
     at: Mapping[str, float] | None = None,
     form: str = FORMS[0],
     notation: str = "matlab",
+    continuous: str | None = None,
 ) -> RequestSpec[str]:
     """Return a linear system as ``matlab``, ``json`` or ``text``; see `linear_system`."""
-    params = {"at": _write_levels(at), "form": form, "notation": notation}
+    params = {**_write_request(at, form, continuous), "notation": notation}
     return RequestSpec("GET", _linear_path(which, rank), lambda response: response.text, params=params)
 
 
@@ -351,6 +355,10 @@ def linear_figure(
     """Return bode, nyquist, pole-map or unit-step of a linear system: svg, or csv with its lines."""
     path = f"{_linear_path(which, rank)}/{quote_id(name)}.{quote_id(form)}"
     return RequestSpec("GET", path, lambda response: response.content, params={"at": _write_levels(at)})
+
+
+def _write_request(at: Mapping[str, float] | None, form: str, continuous: str | None) -> dict[str, Any]:
+    return {"at": _write_levels(at), "form": form, **({"continuous": continuous} if continuous else {})}
 
 
 def _linear_path(which: JobRef, rank: int) -> str:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from islands.errors import SettingsError
 from islands.evolution.presets import PRESET_NAMES
 from islands.report.figures.names import ALL_FIGURES
 
@@ -34,8 +35,34 @@ RecordsOrNone = Annotated[
     list[Path] | None,
     typer.Argument(metavar="RECORD...", help="Recordings of one system, as for fit; not with --resume."),
 ]
+
+
+def require_inputs(names: list[str] | None) -> list[str]:
+    """Return the names of inputs.
+
+    Raises
+    ------
+    SettingsError
+        There is none.
+    """
+    if not names:
+        raise SettingsError(
+            "name the inputs as --input NAME: a model computes the output from its inputs. A record without "
+            "an input, as of a free decay or of noise, cannot be modelled; record the force, voltage or set "
+            "point that moves the system, too. islands inspect RECORD lists the columns"
+        )
+    return names
+
+
 Inputs = Annotated[
-    list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")
+    list[str],
+    typer.Option(
+        "--input",
+        help="Input column; repeat it, or separate by commas, for several. Required.",
+        default_factory=list,
+        show_default=False,
+        callback=require_inputs,
+    ),
 ]
 InputsOrNone = Annotated[
     list[str] | None,

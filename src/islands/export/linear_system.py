@@ -90,9 +90,12 @@ def _write_text(system: StateSpace, form: str) -> str:
         return "\n".join(lines)
     numerators, denominator = system.transfer_functions()
     below = _write_polynomial(denominator, variable)
+    # Numerators are differences of polynomials of the size of the denominator.
+    rounding = len(denominator) ** 2 * np.finfo(np.float64).eps
     for row, output in zip(numerators, system.output_names, strict=True):
         for numerator, name in zip(row, system.input_names, strict=True):
-            above = _write_polynomial(numerator, variable)
+            size = max(np.abs(denominator).max(), np.abs(numerator).max())
+            above = _write_polynomial(np.where(np.abs(numerator) > rounding * size, numerator, 0.0), variable)
             lines += ["", f"{output} over {name} =", f"  {above}", f"  {'-' * max(len(above), len(below))}"]
             lines += [f"  {below}"]
     return "\n".join(lines)
@@ -100,9 +103,10 @@ def _write_text(system: StateSpace, form: str) -> str:
 
 def _write_polynomial(coefficients: NDArray[np.float64], variable: str) -> str:
     top = len(coefficients) - 1
+    powers = [f"{variable}^{power}" if power > 1 else variable * power for power in range(top, -1, -1)]
     terms = [
-        f"{value:.7g}" + (f" {variable}^{top - place}" if place < top - 1 else f" {variable}" * (place < top))
-        for place, value in enumerate(coefficients)
+        power if value == 1.0 and power else f"{value:.7g} {power}".rstrip()
+        for value, power in zip(coefficients.tolist(), powers, strict=True)
         if value
     ]
     return " + ".join(terms).replace("+ -", "- ") or "0"

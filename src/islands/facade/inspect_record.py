@@ -72,8 +72,11 @@ def inspect_record(
 
 
 def _add_linearity(found: RecordInspection) -> RecordInspection:
-    """Return an inspection with the fact whether a linear model explains the record."""
-    if found.record is None:
+    """Return an inspection with the fact whether a linear model explains the record.
+
+    The free run of an unstable process diverges, so that it explains nothing.
+    """
+    if found.record is None or any(each.finding == "feedback_unstable" for each in found.facts.facts):
         return found
     at_once = any(each.name == "dead-time" and each.value == 0.0 for each in found.facts.facts)
     fact = check_linearity(found.record, feedthrough=at_once)

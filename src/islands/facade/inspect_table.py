@@ -24,6 +24,7 @@ from islands.records.inspection.gross_errors import find_input_codes
 from islands.records.inspection.record_facts import RecordFacts, measure_facts
 from islands.records.inspection.record_note import MOST_ROWS, RecordNote, make_note
 from islands.records.inspection.stamp_regularity import NO_BREAKS, TimeStamps, describe_stamps
+from islands.records.inspection.static_curve import describe_static_curve, is_static_curve
 from islands.records.reading.column_names import find_column, split_structures
 from islands.records.reading.open_table import exclude_gross_errors, read_table
 from islands.records.reading.options import DEFAULT_READING, EXCLUDE, KEEP, ROWS, SAMPLE, ReadingOptions
@@ -123,8 +124,12 @@ class _FileInspection:
             values |= errors
         stamps, sampling = self._describe_sampling(read, size)
         warnings = [warning for warning in self.found.warnings if warning != sampling.problem]
-        record, facts, remedy, problem = None, RecordFacts(()), self.reading, ""
-        if choice.output:
+        record, facts, remedy = None, RecordFacts(()), self.reading
+        problem = self._describe_static(choice, usable)
+        is_static = bool(problem)
+        if is_static:
+            sampling, warnings = replace(sampling, problem=""), []
+        elif choice.output:
             repaired, problem = self._read_repaired(choice, self.reading)
             is_repaired = self.reading.gaps is not None or self.reading.resample is not None
             # A record with other samples than the rows has those of columns with different clocks.
@@ -143,6 +148,7 @@ class _FileInspection:
             facts = measure_facts(record) if record is not None else facts
             if repaired is None and not is_repaired:
                 remedy = self._find_remedy(choice, sampling.dt)
+        command = "" if is_static else self._make_command(choice, remedy)
         unknown = _NO_SAMPLING_TIME if sampling.dt is None and facts.facts else ""
         breaks = () if stamps is None else stamps.breaks
         rows = {
@@ -159,7 +165,7 @@ class _FileInspection:
             choice,
             facts,
             _make_notes(texts, {sampling.problem, problem, *self.found.problems}, rows, first),
-            self._make_command(choice, remedy),
+            command,
             _find_changes(self.reading, remedy),
             record,
         )
@@ -174,6 +180,15 @@ class _FileInspection:
             if name in chosen or (name in first and (output is None or not inputs)):
                 read[name] = self.table.read((name,), self.rows)
         return read
+
+    def _describe_static(self, choice: ColumnChoice, usable: Mapping[str, NDArray[np.float64]]) -> str:
+        """State that two columns are points of a curve; empty for a record of a time."""
+        is_timed = self.found.time is not None or self.found.dt is not None or self.dt is not None
+        names = [find_column(name, self.table.names) for name in (*choice.inputs, choice.output)]
+        pair = names if choice.output else list(usable)
+        if is_timed or len(pair) != 2 or not is_static_curve(*(usable[name] for name in pair)):
+            return ""
+        return describe_static_curve(self.path.name, *pair)
 
     def _find_gross_errors(
         self, read: Mapping[str, Columns], choice: ColumnChoice

@@ -206,6 +206,28 @@ class LatentModel(ParametricModel):
         return self.memory
 
     @property
+    def free_size(self) -> int:
+        """Number of parameters that the response determines.
+
+        Those of a linear model are its poles, the numerators and direct paths of every input, its dead times,
+        and the level or the drift; the coordinates of the states add further parameters to the equations. Of
+        a model with units all parameters are counted.
+        """
+        if self.units:
+            return self.size
+        numerators = sum(name[0] in "bd" for name in self.names)
+        has_level = any(name[0] in "lo" for name in self.names)
+        return self.order + numerators + sum(map(bool, self.delays)) + has_level
+
+    @property
+    def structure(self) -> str:
+        """Order and dead times as text: ``order 2, dead time of u_V 0.3 s``."""
+        step, unit = (1.0, "samples") if self.dt is None else (self.dt, "s")
+        late = zip(self.column_names, self.delays, strict=False)
+        parts = [f"dead time of {name} {delay * step:.4g} {unit}" for name, delay in late if delay]
+        return ", ".join([f"order {self.order}", *parts])
+
+    @property
     def input_lags(self) -> tuple[int, ...]:
         """Number of samples by which the output and the states read each column of the inputs late."""
         return tuple(

@@ -98,6 +98,11 @@ class Model:
         return len(self.regressors)
 
     @property
+    def free_size(self) -> int:
+        """Number of parameters that the response determines: that of the terms."""
+        return self.size
+
+    @property
     def inputs(self) -> int:
         """Number of inputs."""
         return len(self.input_names)

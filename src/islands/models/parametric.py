@@ -126,6 +126,11 @@ class ParametricModel(ABC):
         return len(self.names)
 
     @property
+    def free_size(self) -> int:
+        """Number of parameters that the response determines; all of them, unless some are coordinates."""
+        return self.size
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         return self.names

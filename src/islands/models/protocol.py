@@ -91,6 +91,10 @@ class DynamicModel(SignalReference, Protocol):
         """Number of parameters."""
 
     @property
+    def free_size(self) -> int:
+        """Number of parameters that the response of the output to the inputs determines."""
+
+    @property
     def parameters(self) -> tuple[float, ...]:
         """Values of the parameters."""
 

@@ -7,7 +7,7 @@ chapters 2 and 3.
 from cmath import log
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import isnan, log10, pi
+from math import comb, isnan, log10, perm, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -386,7 +386,8 @@ class StateSpace:
         if bad.size:
             raise ModelError(
                 f"the pole {bad[0].real:.3g} has no continuous counterpart for inputs that are held: it is a "
-                "delay or alternates from sample to sample. Take to_continuous('tustin')"
+                "delay or alternates from sample to sample. Hand over the discrete system, or convert by "
+                "Tustin's rule (tustin)"
             )
         from scipy.linalg import logm  # noqa: PLC0415 - a twentieth of a second, for this conversion alone
 
@@ -452,19 +453,25 @@ class StateSpace:
         kept = tuple(weight / sum(weights) for weight in weights)
         return replace(self, A=A, B=B, C=C, D=D, dt=dt, members=tuple(members), weights=kept)
 
-    def expand_delays(self) -> "StateSpace":
-        """Return the discrete system with its dead times as states.
+    def expand_delays(self, pade: int | None = None) -> "StateSpace":
+        """Return the system with its dead times as states.
+
+        Parameters
+        ----------
+        pade : int, optional
+            States of each dead time of a continuous system: the order of its Pade approximation, whose
+            magnitude is 1. That of order 4 has the phase to a degree up to ``0.7 / dead time`` hertz.
 
         Raises
         ------
         ModelError
-            The system is continuous and has a dead time.
+            The system is continuous and has a dead time, and no order is given.
         """
-        counts = np.rint(self.delays / self.step).astype(int) if self.step else self.delays
-        if not counts.any():
+        if not self.delays.any():
             return self
         if self.is_continuous:
-            raise ModelError("a dead time has no finite number of states: take the discrete system")
+            return self._approximate_delays(pade)
+        counts = np.rint(self.delays / self.step).astype(int)
         system, total = self, int(counts.sum())
         order, inputs = self.B.shape
         A, B = np.zeros((order + total,) * 2), np.zeros((order + total, inputs))
@@ -484,6 +491,35 @@ class StateSpace:
         members = tuple(each.expand_delays() for each in self.members)
         return replace(self, A=A, B=B, C=C, D=D, dead_times=(), members=members)
 
+    def _approximate_delays(self, count: int | None) -> "StateSpace":
+        if count is None or count < 1:
+            raise ModelError(
+                "a dead time has no finite number of states in continuous time: take the discrete system, or "
+                "state the order of a Pade approximation, as pade=4"
+            )
+        # Coefficients of the powers of s * dead time, the highest one first: Golub and Van Loan, Matrix
+        # Computations, 4th ed., 2013, section 9.3.1.
+        powers = np.arange(count, -1, -1)
+        weights = np.array([comb(count, k) / perm(2 * count, k) for k in powers])
+        late = [place for place, delay in enumerate(self.delays) if delay]
+        order, total = self.order, count * len(late)
+        A, B = np.zeros((order + total,) * 2), np.zeros((order + total, self.D.shape[1]))
+        C, D = np.hstack([self.C, np.zeros((len(self.C), total))]), self.D.copy()
+        A[:order, :order], B[:order] = self.A, self.B
+        for first, place in zip(range(order, order + total, count), late, strict=True):
+            # N(s) / N(-s) = (-1)^count + a strictly proper rest, in the controllable form of unit dead time.
+            own, direct = slice(first, first + count), (-1.0) ** count
+            ahead = weights * (-1.0) ** powers
+            rest = ((ahead - direct * weights) / weights[0])[1:]
+            A[own, own] = np.eye(count, k=-1) / self.delays[place]
+            A[first, own] = -weights[1:] / weights[0] / self.delays[place]
+            A[:order, own] = np.outer(self.B[:, place], rest)
+            C[:, own] = np.outer(self.D[:, place], rest)
+            B[:order, place], D[:, place] = direct * self.B[:, place], direct * self.D[:, place]
+            B[first, place] = 1.0 / self.delays[place]
+        members = tuple(each.expand_delays(count) for each in self.members)
+        return replace(self, A=A, B=B, C=C, D=D, dead_times=(), members=members)
+
     def transfer_functions(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return numerators, shape (outputs, inputs, order + 1), and the common denominator, (order + 1,).
 
@@ -499,18 +535,24 @@ class StateSpace:
                 numerators[output, channel] = np.real(np.poly(closed)) + (direct - 1.0) * denominator
         return numerators, denominator
 
-    def to_control(self, form: str = "state-space") -> "control.StateSpace | control.TransferFunction":
+    def to_control(
+        self, form: str = "state-space", *, pade: int | None = None
+    ) -> "control.StateSpace | control.TransferFunction":
         """Return the system as one of the library python-control (extra ``control``).
+
+        A discrete system stays discrete; ``to_continuous().to_control()`` is the continuous one.
 
         Parameters
         ----------
         form : str
-            ``state-space`` or ``transfer-function``. Dead times become states.
+            ``state-space`` or ``transfer-function``.
+        pade : int, optional
+            As of `expand_delays`: dead times become states, since python-control has none.
 
         Raises
         ------
         ModelError
-            python-control is not installed, or the system is continuous and has a dead time.
+            python-control is not installed, or the system is continuous and has a dead time without ``pade``.
         SettingsError
             The form is unknown.
         """
@@ -520,7 +562,7 @@ class StateSpace:
             import control as library  # noqa: PLC0415 - an extra
         except ImportError as error:
             raise ModelError(describe_missing_extra("a linear system", "control")) from error
-        system = self.expand_delays()
+        system = self.expand_delays(pade)
         names: dict[str, Any] = {"inputs": list(self.input_names) or None}
         names["outputs"] = list(self.output_names) or None
         dt = True if self.dt is None else self.dt
@@ -540,8 +582,8 @@ class StateSpace:
         return ", ".join(f"{name} = {value:.4g}" for name, value in pairs) or "its operating point"
 
     def describe(self) -> tuple[str, ...]:
-        """State time constants and resonances of a discrete system, dead times and static gains."""
-        modes = describe_poles(self.poles, self.dt) if self.dt else ()
+        """State time constants and resonances, dead times and static gains."""
+        modes = () if self.dt is None else describe_poles(self.poles, self.dt)
         late = [
             f"dead time of {name} {delay:.4g} s"
             for name, delay in zip(self.input_names, self.dead_times, strict=False)
@@ -585,8 +627,11 @@ def _check_method(method: str) -> None:
 
 
 def find_resonances(poles: Iterable[complex], dt: float) -> list[tuple[float, float]]:
-    """Return the frequency in hertz and the damping ratio of every pair of complex poles, slowest first."""
-    rates = [log(pole) / dt for pole in poles if pole.imag > 0.0]
+    """Return the frequency in hertz and the damping ratio of every pair of complex poles, slowest first.
+
+    A sampling time of 0 is that of poles in continuous time.
+    """
+    rates = [log(pole) / dt if dt else pole for pole in poles if pole.imag > 0.0]
     return sorted((abs(rate) / (2.0 * pi), -rate.real / abs(rate)) for rate in rates)
 
 
@@ -613,22 +658,31 @@ class Quantity:
     input: int | None = None
 
 
-def list_modes(poles: Iterable[complex]) -> list[complex]:
+def list_modes(poles: Iterable[complex], is_continuous: bool = False) -> list[complex]:
     """Return the real poles, and of each pair of complex ones that above the real axis, slowest first."""
-    ordered = sorted(map(complex, poles), key=lambda each: (-abs(each), -each.imag))
+    ordered = sorted(
+        map(complex, poles), key=lambda each: (-each.real if is_continuous else -abs(each), -each.imag)
+    )
     return [pole for pole in ordered if pole.imag >= 0.0]
 
 
 def measure_mode(pole: complex, dt: float) -> tuple[Quantity, ...]:
-    """Return the quantities of a mode: a time constant, or frequency and damping ratio; none of a delay."""
-    if not pole:
+    """Return the quantities of a mode: a time constant, or frequency and damping ratio; none of a delay.
+
+    A sampling time of 0 is that of a pole in continuous time.
+    """
+    if _is_delay(pole, dt):
         return ()
     if pole.imag > 0.0:
         ((frequency, damping),) = find_resonances([pole], dt)
         return Quantity("frequency", frequency, "Hz"), Quantity("damping ratio", damping)
-    if not 0.0 < pole.real < 1.0:
+    if not (0.0 < pole.real < 1.0 if dt else pole.real < 0.0):
         return (Quantity("pole", pole.real),)
-    return (Quantity("time constant", -dt / log(pole).real, "s"),)
+    return (Quantity("time constant", -dt / log(pole).real if dt else -1.0 / pole.real, "s"),)
+
+
+def _is_delay(pole: complex, dt: float) -> bool:
+    return bool(dt) and not pole
 
 
 def _measure_gains(system: StateSpace) -> Iterable[Quantity]:
@@ -666,12 +720,12 @@ def describe_poles(
     ----------
     poles : iterable of complex
     dt : float
-        Sampling time in seconds.
+        Sampling time in seconds; 0 of poles in continuous time.
     errors : sequence of float, optional
         Standard errors of the quantities of all modes, one mode after the other.
     """
     texts, left = [], list(errors or ())
-    for pole in list_modes(poles):
+    for pole in list_modes(poles, is_continuous=not dt):
         quantities = measure_mode(pole, dt)
         own, left = left[: len(quantities)], left[len(quantities) :]
         texts.append(_describe_pole(pole, dt, [write_error(each) for each in own] or [""] * 2))
@@ -684,7 +738,7 @@ def write_error(error: float) -> str:
 
 
 def _describe_pole(pole: complex, dt: float, errors: Sequence[str]) -> str:
-    if not pole:
+    if _is_delay(pole, dt):
         return "a delay of one sample"
     first, *others = measure_mode(pole, dt)
     if others:
@@ -692,6 +746,6 @@ def _describe_pole(pole: complex, dt: float, errors: Sequence[str]) -> str:
         return f"resonance at {frequency} with a damping ratio of {others[0].value:.3g}{errors[1]}"
     if first.name == "time constant":
         return f"time constant {first.value:.4g}{errors[0]} s"
-    if pole.real < 0.0:
+    if dt and pole.real < 0.0:
         return f"an alternating mode (pole {pole.real:.4g}{errors[0]})"
     return f"a mode that does not decay (pole {pole.real:.6g}{errors[0]})"

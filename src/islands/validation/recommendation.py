@@ -148,13 +148,11 @@ def measure_size(model: DynamicModel) -> float:
     """Return the number of terms by which models are compared; a constant is half a term.
 
     The zero of a unit decides whether a law has a constant: in another unit, the law with one more term is
-    still larger, and without an offset the law without a constant is smaller. Of a linear state space, the
-    coordinates of the states are no terms: its law has the poles, and the numerators of every input.
+    still larger, and without an offset the law without a constant is smaller.
     """
-    if isinstance(model, LatentModel) and not model.units:
-        return model.order + sum(name[0] in "bd" for name in model.wiring) + 0.5
     has_constant = isinstance(model, Model) and any(item.expression == _ONE for item in model.regressors)
-    return model.size - 0.5 * has_constant
+    has_level = isinstance(model, LatentModel) and not model.units
+    return model.free_size - 0.5 * (has_constant or has_level)
 
 
 def recommend(

@@ -38,12 +38,22 @@ function makePointForm(names, change) {
   };
 }
 
+/** Make the choice of the time of the files, with its check box. */
+function makeTimeChoice() {
+  const box = el("input", { type: "checkbox", name: "continuous" });
+  const text = "Files in continuous time (inputs held between samples)";
+  return { box, node: el("label", { class: "check" }, box, ` ${text}`) };
+}
+
 /** Make what a system about an operating point has: words, files and figures. */
 function makeContent(path, system, point, signal) {
-  const save = (form, notation) => {
-    const query = new URLSearchParams([...point, ["form", form], ["notation", notation]]);
-    return runOnceAtATime(() => download(`${path}?${query}`, "system.txt").catch(showProblem));
-  };
+  const time = makeTimeChoice();
+  const save = (form, notation) =>
+    runOnceAtATime(() => {
+      const query = new URLSearchParams([...point, ["form", form], ["notation", notation]]);
+      if (time.box.checked) query.set("continuous", "zoh");
+      return download(`${path}?${query}`, "system.txt").catch(showProblem);
+    });
   const query = `?${new URLSearchParams(point)}`;
   const buttons = FILES.map(([name, form, notation]) =>
     el("button", { type: "button", on: { click: save(form, notation) } }, name),
@@ -51,6 +61,7 @@ function makeContent(path, system, point, signal) {
   return [
     el("ul", { class: "modes" }, system.words.map((text) => el("li", {}, text))),
     el("div", { class: "row exports", role: "group", "aria-label": "Save the linear system as" }, buttons),
+    time.node,
     el("div", { class: "gallery" }, FIGURES.map((name) => makeFigure(path, name, signal, query))),
   ];
 }

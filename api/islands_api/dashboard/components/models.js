@@ -90,7 +90,7 @@ const claimHysteresis = (models) => models.some((model) => model.physics.propert
 
 function makeModelTable(job, models) {
   const hysteresis = claimHysteresis(models);
-  const size = nameSize(models[0]?.kind);
+  const size = nameSize(models.find(({ kind }) => kind)?.kind);
   const further = hysteresis ? HYSTERESIS_HEADINGS : [];
   const names = ["Rank", size, ...ERRORS, ...further, "Free-run residual"];
   const headings = names.map((name, at) => [name, at === 0 ? null : "figure"]);

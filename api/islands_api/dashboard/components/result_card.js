@@ -2,9 +2,8 @@
 
 import { getJobPath, getJson } from "../lib/api.js";
 import { el, makeFacts } from "../lib/dom.js";
-import { formatPercent, formatQuantity, formatShort, labelQuantity, nameSize } from "../lib/numbers.js";
+import { formatPercent, formatQuantity, formatShort, labelQuantity } from "../lib/numbers.js";
 import { makeLineChart } from "./chart.js";
-import { getModelClass } from "./job_state.js";
 import { makeEquation } from "./models.js";
 import { makeTryModel } from "./try_model.js";
 
@@ -58,7 +57,7 @@ export function makeResultCard(job, unit, columns, signal) {
         ["Mean error, free run", `${formatPercent(metrics.mape)} of the range`],
         ["RMSE, free run", formatQuantity(metrics.rmse, unit)],
         ["90 % band, half-width", formatQuantity(half, unit)],
-        [nameSize(getModelClass(job)), String(size)],
+        ["Parameters", String(size)],
       ]),
     );
   const chart = makeLineChart({

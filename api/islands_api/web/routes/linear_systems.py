@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Query, Response
 
 from islands.export.linear_system import NOTATIONS, write_linear_system
 from islands.models.operating_point import parse_levels
-from islands.models.state_space import FORMS
+from islands.models.state_space import FORMS, METHODS
 from islands.report.figures.names import LINEAR_FIGURES
 from islands_api.result_schemas import LinearSystemView
 from islands_api.web.auth import Principal, Reader
@@ -49,6 +49,14 @@ Notation = Annotated[
         json_schema_extra={"enum": list(NOTATIONS)},
     ),
 ]
+Continuous = Annotated[
+    str | None,
+    Query(
+        description="The system in continuous time: `zoh`, the one with these samples at inputs that are "
+        "held between them, or `tustin`. By default it is discrete.",
+        json_schema_extra={"enum": list(METHODS)},
+    ),
+]
 
 #: Path parameter: a figure of a linear system.
 Figure = Annotated[
@@ -76,6 +84,7 @@ async def linear_system(
     at: Levels = [],  # noqa: B006 - FastAPI copies it
     form: Form = FORMS[0],
     notation: Notation = "json",
+    continuous: Continuous = None,
 ) -> Response:
     """Return the linear system of a model about an operating point: state space or transfer functions.
 
@@ -90,6 +99,8 @@ async def linear_system(
 
         fitted = read_fitted(entry.id, stored.file, stored.document, document)
         system = fitted.linearise(*split_point(fitted.model, levels))
+        if continuous is not None:
+            system = system.to_continuous(continuous)
         return write_linear_system(system, form, notation)
 
     async with state.simulation_slots.hold(caller.owner):

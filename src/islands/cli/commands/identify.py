@@ -59,6 +59,8 @@ def identify(
         run(run_options, resume, *load_run(resume))
     else:
         outputs = options.columns(output_columns or [])
+        if records and outputs and out is not None:
+            inputs = options.require_inputs(inputs)
         if not records or not inputs or not outputs or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)

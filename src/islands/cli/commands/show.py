@@ -66,6 +66,14 @@ def show(
             "middle of the range of its data. Name the output, too, if the model rests at several.",
         ),
     ] = None,
+    continuous: Annotated[
+        str | None,
+        typer.Option(
+            "--continuous",
+            help="Linear system in continuous time: zoh, the one with these samples at inputs that are held "
+            "between them, or tustin.",
+        ),
+    ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     reading: ReadingOptions,
@@ -82,10 +90,16 @@ def show(
     The report of a result folder is one HTML file, which prints on A4, with its figures.
     """
     if kind in FORMS or (figure in LINEAR_FIGURES and record is None):
-        _show_linear(model, kind, figure, out, parse_levels(options.columns(at or []), "--at"))
+        if continuous and kind is None:
+            raise SettingsError(f"--continuous is for the formats {', '.join(FORMS)}")
+        levels = parse_levels(options.columns(at or []), "--at")
+        _show_linear(model, kind, figure, out, levels, continuous)
         return
-    if at:
-        raise SettingsError(f"--at is for the formats {', '.join(FORMS)} and for figures of linear systems")
+    if at or continuous:
+        raise SettingsError(
+            f"--{'at' if at else 'continuous'} is for the formats {', '.join(FORMS)}"
+            + (" and for figures of linear systems" if at else "")
+        )
     if figure is not None:
         _draw(model, figure, record, out, dt, parse_rows(rows), reading)
         return
@@ -129,7 +143,12 @@ def _print(text: str | None) -> None:
 
 
 def _show_linear(
-    name: str, form: str | None, figure: str | None, out: Path | None, values: dict[str, float]
+    name: str,
+    form: str | None,
+    figure: str | None,
+    out: Path | None,
+    values: dict[str, float],
+    continuous: str | None,
 ) -> None:
     """Write the linear system of a model, or draw it."""
     # The classes of results take a second to import, as `load` does.
@@ -147,7 +166,10 @@ def _show_linear(
 
         save(loaded.plot_linear(figure or LINEAR_FIGURES[0], *at), out)
         return
-    text = write_linear_system(loaded.linearise(*at), form, find_notation(out))
+    system = loaded.linearise(*at)
+    if continuous:
+        system = system.to_continuous(continuous)
+    text = write_linear_system(system, form, find_notation(out))
     _print(text if out is None else None)
     if out is not None:
         out.write_text(f"{text}\n", encoding="utf-8")

@@ -18,7 +18,7 @@ from islands.cli.progress_display import compile_kernels
 from islands.cli.settings_options import with_settings
 from islands.errors import ExtrapolationWarning, ModelError, SettingsError
 from islands.facade.load import Loaded, load
-from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.fitted_model import FittedModel, list_metrics
 from islands.facade.results.identification import Result
 from islands.facade.results.model_simulation import (
     SHOOTING,
@@ -42,6 +42,7 @@ from islands.records.reading.options import ReadingOptions
 from islands.records.reading.reader import open_record
 from islands.records.reading.row_range import parse_rows
 from islands.records.writer import write_simulation
+from islands.sentences import write_amount
 from islands.settings_schema import Integer, setting, settings_class
 from islands.simulation.initial_outputs import ESTIMATED_START, has_estimated_start
 from islands.simulation.initial_states import find_first_states
@@ -237,6 +238,7 @@ def _simulate_model(
         for statement in list_extrapolations(model, data, ranges["estimation"]):
             output.print(f"extrapolation: {statement}", markup=False)
     compile_kernels()
+    errors = _list_validation_errors(found, mode)
     y, states = split_start(model, request.start)
     if y or states or not np.isfinite(data.y).any():
         if request.bands is not None:
@@ -247,7 +249,7 @@ def _simulate_model(
             names = " ".join(f"--start {name}=VALUE" for name in found.output_names)
             raise ModelError(f"{error}{'' if y or states else f', as {names}'}") from error
         line = f"{mode} {_describe_start(request)}: {simulation.outcome}"
-        _print_metrics(data, simulation.y, line, request.out, None, bool(simulation.outcome))
+        _print_metrics(data, simulation.y, line, request.out, None, bool(simulation.outcome), errors)
         return
     first = found.warm_up if request.settings.warm_up is None else request.settings.warm_up
     band = None if request.bands is None else found.bands(data, request.bands, first)
@@ -257,7 +259,14 @@ def _simulate_model(
             output.print(ESTIMATED_START, markup=False)
         _print_first_states(model, data, first)
     line = f"{mode} after a warm-up of {first} samples: {simulation.outcome}"
-    _print_metrics(data, simulation.y, line, request.out, band, bool(simulation.outcome))
+    _print_metrics(data, simulation.y, line, request.out, band, bool(simulation.outcome), errors)
+
+
+def _list_validation_errors(found: FittedModel, mode: str) -> list[float]:
+    """Return the RMSE of every output on the validation data of the model; none outside of a result."""
+    name = {"one-step": "one_step_ahead", "shooting": "multiple_shooting"}.get(mode, "free_run")
+    known = list_metrics(found.metrics).values() if found.metrics else ()
+    return [float(errors["validation"][name].rmse) for errors in known]
 
 
 def _describe_start(request: _Request) -> str:
@@ -326,8 +335,12 @@ def _print_metrics(
     out: Path | None,
     band: PredictionBand | None = None,
     is_complete: bool = True,
+    validation: Sequence[float] = (),
 ) -> None:
-    """Write a simulation and print the errors of every output; one that diverged has none."""
+    """Write a simulation and print the errors of every output; one that diverged has none.
+
+    They are compared with the RMSE on the validation data of the model, if it is known.
+    """
     if out is not None:
         write_simulation(data, simulated, out, None if band is None else (band.lower, band.upper))
         output.print(f"{out}: {data.samples} rows", markup=False)
@@ -336,12 +349,12 @@ def _print_metrics(
     for place, (each, y) in enumerate(zip(data.records, runs, strict=True)):
         title = f"{each.output_name}: " if len(data.records) > 1 else ""
         if is_complete:
-            _print_errors(each, y, title)
+            _print_errors(each, y, title, validation[place] if validation else None)
             if band is not None:
                 _print_band(each, band.outputs[place], title)
 
 
-def _print_errors(data: Dataset, y: NDArray[np.float64], title: str) -> None:
+def _print_errors(data: Dataset, y: NDArray[np.float64], title: str, validation: float | None) -> None:
     known = int(np.count_nonzero(np.isfinite(data.y) & np.isfinite(y)))
     if not known:
         text = f"{data.output_name}: {y[0]:.6g} at the first sample, {y[-1]:.6g} at the last"
@@ -353,6 +366,9 @@ def _print_errors(data: Dataset, y: NDArray[np.float64], title: str) -> None:
             f"{title}MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} "
             f"{data.output_unit}  fit {errors.fit_percent:.3f} %"
         )
+        if validation:
+            ratio, stated = errors.rmse / validation, write_amount(validation, data.output_unit)
+            text += f"\n{title}{ratio:.3g} times the RMSE on the validation data of the model, {stated}"
     output.print(text, markup=False)
 
 

@@ -68,6 +68,46 @@ def find_direct_inputs(record: Dataset) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
+def find_linear_paths(record: Dataset) -> tuple[int, ...]:
+    """Return the inputs whose present value removes a quarter of the squared error of a linear prediction.
+
+    The inputs may move in one part of the record alone, as in an impact test, so that no other part shows the
+    response again: that an input acts at once is then to be confirmed by models with and without it.
+
+    Parameters
+    ----------
+    record : Dataset
+        Estimation data without missing values.
+    """
+    rows = _choose_rows(record)
+    varying = [place for place in range(record.inputs) if np.ptp(record.u[:, place]) > 0.0]
+    if not varying or not np.ptp(record.y) > 0.0:
+        return ()
+    signals = [_standardise(signal) for signal in (record.y, *record.u[:, varying].T)]
+    past = [np.ones(rows.size)]
+    past += [signal[rows - lag] for signal in signals for lag in range(1, _OUTPUT_LAGS + 1)]
+    if rows.size < _ROWS_PER_COLUMN * _FOLDS * len(past):
+        return ()
+    without = _measure_error(past, signals[0][rows])
+    if without <= _COMPLETE**2 * np.mean(np.diff(signals[0]) ** 2):
+        return ()
+    # Together with the other inputs, which may be correlated with it.
+    present = [signal[rows] for signal in signals[1:]]
+    whole = _measure_error([*past, *present], signals[0][rows])
+    others = [present[:at] + present[at + 1 :] for at in range(len(present))]
+    return tuple(
+        place
+        for place, rest in zip(varying, others, strict=True)
+        if _measure_error([*past, *rest], signals[0][rows]) - whole >= LEAST_GAIN * without
+    )
+
+
+def _measure_error(columns: _Columns, target: NDArray[np.float64]) -> float:
+    matrix = np.column_stack(columns)
+    weights = np.linalg.lstsq(matrix, target, rcond=_ACCURACY**2)[0]
+    return float(np.mean((target - matrix @ weights) ** 2))
+
+
 def _choose_rows(record: Dataset) -> NDArray[np.int64]:
     """Return the predicted samples, at equal distances over all recordings."""
     usable = np.concatenate([np.arange(begin + _LARGEST_LAG, end) for begin, end in record.bounds])

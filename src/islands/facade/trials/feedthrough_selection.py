@@ -3,14 +3,17 @@
 import numpy as np
 
 from islands.errors import RecordError
-from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
+from islands.estimation.linear.latent import identify_linear_model
+from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs, find_linear_paths
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.rate_selection import compute_errors
 from islands.records.channel_names import parse_channel_name
 from islands.records.input_lead import advance_inputs, check_feedthrough
+from islands.records.inspection.feedback import find_feedback
 from islands.records.split import Split
+from islands.simulation.predictors import free_run
 
-#: Largest error on the validation data relative to that of models without feedthrough.
+#: Largest squared error relative to that of models without feedthrough.
 LARGEST_RATIO = 0.98
 
 
@@ -18,8 +21,10 @@ def select_feedthrough(split: Split, feedthrough: str, library: TrialLibrary) ->
     """Advance the inputs to which the output responds within the sample, as the setting says.
 
     ``auto`` tests the estimation data (see `find_direct_inputs`). It advances the inputs that it finds if
-    small models of the library are then better in free run on the validation data. Inputs that the caller
-    already reads one sample early (``u_V+1``) do not change.
+    small models of the library are then better in free run on the validation data. Otherwise it advances the
+    inputs whose present value improves a linear prediction, if the linear model is then better in free run on
+    the estimation data: an impact is in these alone. In a closed loop, that would be the path of the
+    controller. Inputs that the caller already reads one sample early (``u_V+1``) do not change.
 
     Parameters
     ----------
@@ -44,14 +49,26 @@ def select_feedthrough(split: Split, feedthrough: str, library: TrialLibrary) ->
     # Statistics of very large numbers overflow: no input of such a record is advanced.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = [place for place in find_direct_inputs(split.estimation) if place in measured]
-        if not found:
+        if found:
+            advanced = _advance(split, found)
+            return advanced if _error(advanced, library) <= LARGEST_RATIO * _error(split, library) else split
+        found = [place for place in find_linear_paths(split.estimation) if place in measured]
+        if not found or find_feedback(split.estimation).value:
             return split
         advanced = _advance(split, found)
-        return advanced if _error(advanced, library) <= LARGEST_RATIO * _error(split, library) else split
+        return advanced if _linear_error(advanced) <= LARGEST_RATIO * _linear_error(split) else split
 
 
 def _advance(split: Split, places: list[int]) -> Split:
     return Split(advance_inputs(split.estimation, places), advance_inputs(split.validation, places))
+
+
+def _linear_error(split: Split) -> float:
+    try:
+        model = identify_linear_model(split.estimation)
+    except RecordError:
+        return np.inf
+    return float(np.nanmean((split.estimation.y - free_run(model, split.estimation).y) ** 2))
 
 
 def _error(split: Split, library: TrialLibrary) -> float:

@@ -13,6 +13,7 @@ from islands.records.inspection.dead_time import estimate_dead_times
 from islands.records.inspection.drift import measure_drift
 from islands.records.inspection.excitation import measure_excitation
 from islands.records.inspection.fact import Fact
+from islands.records.inspection.feedback import find_feedback
 from islands.records.inspection.loop import check_loop
 from islands.records.inspection.noise import measure_noise
 from islands.records.inspection.oversampling import recommend_rate
@@ -27,7 +28,7 @@ MOST_SAMPLES, MOST_INPUTS = 100_000, 16
 #: Names of the facts, in their order.
 FACTS = (
     *("samples", "quantisation", "saturation", "noise", "band", "levels", "coverage", "excitation-order"),
-    *("dead-time", "rest", "loop", "drift", "sampling-time"),
+    *("dead-time", "feedback", "rest", "loop", "drift", "sampling-time"),
 )
 
 
@@ -83,6 +84,7 @@ def measure_facts(record: Dataset) -> RecordFacts:
             found += _measure("quantisation", channel.name, partial(_describe_channel, channel, part))
         varying = [place for place in range(min(part.inputs, MOST_INPUTS)) if np.ptp(part.u[:, place]) > 0.0]
         found += _measure("dead-time", "", partial(estimate_dead_times, part, varying))
+        found += _measure("feedback", "", lambda: [find_feedback(part)])
         found += _measure("rest", "", lambda: [check_rest(part)])
         found += _measure("loop", "", lambda: [check_loop(part, place) for place in varying])
         found += _measure("drift", "", lambda: [measure_drift(complete)])

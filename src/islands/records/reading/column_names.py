@@ -9,7 +9,14 @@ from reprlib import repr as abbreviate
 from types import MappingProxyType
 
 from islands.errors import RecordError, SettingsError, join_text, name_option
-from islands.records.channel_names import AT_ONCE, is_unit, normalise_unit, parse_unit, spell_unit
+from islands.records.channel_names import (
+    AT_ONCE,
+    is_unit,
+    normalise_unit,
+    parse_channel_name,
+    parse_unit,
+    spell_unit,
+)
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
 TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -68,7 +75,7 @@ def split_structures(names: Iterable[str]) -> dict[str, str]:
 
 
 def find_column(name: str, columns: Iterable[str]) -> str:
-    """Return the column of a name: ``u_V`` for ``u_V+1``, and ``u [V]`` for ``u`` if only one column fits.
+    """Return the column of a name: ``u_V`` for ``u_V+1``; ``u [V]`` or ``u/V`` for ``u`` if only one fits.
 
     A column with exactly the given name takes precedence.
     """
@@ -79,7 +86,11 @@ def find_column(name: str, columns: Iterable[str]) -> str:
     fitting = [
         column
         for column in columns
-        if _BRACKETED_UNIT.fullmatch(column, len(base)) and column.startswith(base)
+        if column.startswith(base)
+        and (
+            _BRACKETED_UNIT.fullmatch(column, len(base))
+            or (column[len(base) :].lstrip().startswith("/") and parse_channel_name(column).stem == base)
+        )
     ]
     return fitting[0] if len(fitting) == 1 else base
 

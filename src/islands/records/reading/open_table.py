@@ -14,6 +14,7 @@ from islands.records.inspection.channel import channels
 from islands.records.inspection.gross_errors import find_gross_errors, find_input_codes
 from islands.records.inspection.quantisation import find_quantisation
 from islands.records.inspection.saturation import find_saturation
+from islands.records.inspection.static_curve import describe_static_curve, is_static_curve
 from islands.records.reading.column_names import (
     find_column,
     list_inputs,
@@ -97,6 +98,11 @@ def read_table(
     structure = structures[chosen[-1]]
     clock = time or find_time_column(table, file, chosen, structure)
     columns = table.read(tuple(dict.fromkeys((*chosen, *([clock] if clock else [])))), rows)
+    is_timed = clock is not None or dt is not None or bool(table.stated(structure))
+    if output is not None and len(sources) == 1 and not (is_timed or missing_output):
+        (source_name,) = sources
+        if is_static_curve(columns.numbers[source_name], columns.numbers[output]):
+            raise RecordError(describe_static_curve(file, source_name, output))
     # A simulation needs no more samples than the lags of its model, which it checks.
     check_length(columns, *([2] if missing_output else []))
     measured = None if output is None else columns.numbers[output]

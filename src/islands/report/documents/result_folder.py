@@ -170,6 +170,12 @@ def _output_document(place: int, entry: CoupledAssessment, steps: Steps) -> dict
     }
 
 
+def _describe_size(model: DynamicModel) -> dict[str, Any]:
+    """Return the number of free parameters of a model, and order and dead times of a state space."""
+    structure = {"structure": model.structure} if isinstance(model, LatentModel) else {}
+    return {"size": model.free_size, **structure}
+
+
 def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, Any]:
     model, written = entry.model, entry.model.equation()
     ensemble = None if entry.bands is None else entry.bands.ensemble
@@ -308,7 +314,7 @@ def _model_document(
         **({} if isinstance(model, Model) else {"kind": model.kind}),
         "rank": rank,
         "recommended": recommended,
-        "size": model.size,
+        **_describe_size(model),
         "equation": written.named,
         "latex": written.latex,
         "signals": describe_signals(model),
@@ -352,7 +358,7 @@ def _comparison_document(assessment: Assessment) -> dict[str, Any]:
     """Return the linear model with which the models are compared as JSON values."""
     written = assessment.model.equation()
     return {
-        "size": assessment.model.size,
+        **_describe_size(assessment.model),
         "equation": written.named,
         "model": json.loads(model_json(assessment.model)),
         **_assessment_document(assessment),

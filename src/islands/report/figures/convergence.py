@@ -74,12 +74,14 @@ def draw_front(result: SearchResult) -> Figure:
     figure = blank(3.2)
     axes = figure.subplots()
     for part, colour, marker in (("estimation", MEASURED, "o"), ("validation", SIMULATED, "s")):
-        points = sorted((entry.model.size, entry.metrics[part]["free_run"].mape) for entry in result.models)
+        points = sorted(
+            (entry.model.free_size, entry.metrics[part]["free_run"].mape) for entry in result.models
+        )
         sizes, errors = zip(*points, strict=True)
         axes.plot(sizes, errors, marker=marker, color=colour, label=part)
     chosen = result.recommended
     error = chosen.metrics["validation"]["free_run"].mape
-    axes.plot(chosen.model.size, error, "o", ms=13, mfc="none", color=RESIDUAL, label="recommended")
+    axes.plot(chosen.model.free_size, error, "o", ms=13, mfc="none", color=RESIDUAL, label="recommended")
     set_log_scale(axes)
     axes.set_xlabel("parameters" if isinstance(chosen.model, ParametricModel) else "terms")
     axes.set_ylabel("free-run MAPE (% of the range)")

@@ -51,7 +51,8 @@ def draw_linear_system(system: StateSpace, kind: str = "bode") -> Figure:
 def draw_bode(system: StateSpace) -> Figure:
     """Draw magnitude and phase from every input to every output, with 90 % bands if they are known.
 
-    The frequencies end at the Nyquist frequency. Resonances are marked with their damping ratio.
+    The frequencies of a discrete system end at the Nyquist frequency. Resonances are marked with their
+    damping ratio.
 
     Parameters
     ----------
@@ -90,8 +91,7 @@ def draw_bode(system: StateSpace) -> Figure:
             below.fill_between(frequencies, *turned, color=style["color"], alpha=_SHADE, lw=0)
     below.set_xlim(frequencies[0], frequencies[-1])
     hertz = _name_frequencies(system)
-    if not system.is_continuous:
-        _mark_resonances(above, below, find_resonances(system.poles, system.step), hertz)
+    _mark_resonances(above, below, find_resonances(system.poles, system.step), hertz)
     units = {(output, unit) for output in system.output_units for unit in system.input_units}
     above.set_ylabel(f"magnitude ({'/'.join(units.pop())})" if _have_one_quotient(units) else "magnitude")
     above.legend(loc="best")

@@ -12,6 +12,7 @@ from islands.sentences import write_one
 _TITLES = {
     "samples": "record",
     "dead-time": "dead time",
+    "feedback": "feedback",
     "rest": "rest",
     "loop": "loop",
     "noise": "noise",
@@ -65,7 +66,7 @@ def format_inspection(inspection: RecordInspection) -> str:
 
 def _says_much(fact: Fact) -> bool:
     """Return whether a fact belongs into the text: not that a signal is as it should be."""
-    if fact.name in ("quantisation", "saturation", "levels"):
+    if fact.name in ("feedback", "quantisation", "saturation", "levels"):
         return bool(fact.value)
     return fact.name != "samples" or ". " in fact.sentence
 

@@ -103,7 +103,7 @@ def table(facts: ResultFacts) -> list[str]:
 def columns(facts: ResultFacts) -> tuple[str, ...]:
     """Return the headings; those of holds only if a model claims hysteresis."""
     rank, size, *errors, residuals = _COLUMNS
-    counted = "parameters" if facts.has_named_parameters else size
+    counted = "parameters" if any("kind" in entry for entry in facts.document["models"]) else size
     return rank, counted, *errors, *(_HYSTERESIS_COLUMNS if facts.claims_hysteresis else ()), residuals
 
 

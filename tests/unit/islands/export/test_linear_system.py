@@ -78,3 +78,13 @@ def test_the_suffix_of_a_file_states_the_notation(tmp_path):
 
 def test_a_latent_model_is_written_at_its_operating_point():
     assert "about u_V = 0.5" in write_linear_system(make_model(operating_inputs=(0.5,)).linearise(), FORMS[0])
+
+
+def test_the_text_of_a_transfer_function_has_no_coefficients_of_rounding():
+    """The numerator of three lags in series has one coefficient; other formats have all bits."""
+    A, B = np.array([[0.9, 0.1, 0.0], [0.0, 0.7, 0.2], [0.0, 0.0, 0.37]]), np.array([[0.0], [0.0], [0.3]])
+    names = {"input_names": ("u",), "output_names": ("y",), "input_units": ("",), "output_units": ("",)}
+    system = StateSpace(A=A, B=B, C=np.array([[1.0, 0.0, 0.0]]), D=np.zeros((1, 1)), dt=0.1, **names)
+    assert np.count_nonzero(system.transfer_functions()[0]) > 1
+    lines = write_linear_system(system, "transfer-function").splitlines()
+    assert [line.strip() for line in lines[-3::2]] == ["0.006", "z^3 - 1.97 z^2 + 1.222 z - 0.2331"]

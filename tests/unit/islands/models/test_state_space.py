@@ -92,7 +92,7 @@ def test_the_continuous_system_has_these_samples(system, method):
 
 def test_a_delay_has_no_continuous_counterpart():
     late = replace(lag_of_two_inputs(), dead_times=(0.5, 0.0)).expand_delays()
-    with pytest.raises(islands.ModelError, match=r"Take to_continuous\('tustin'\)"):
+    with pytest.raises(islands.ModelError, match="Hand over the discrete system"):
         late.to_continuous()
     assert late.to_continuous("tustin").static_gain == pytest.approx(late.static_gain)
 
@@ -124,6 +124,46 @@ def test_python_control_has_the_same_system(system, form, dead_time):
         step = np.outer(np.eye(inputs)[0], np.ones(40))
         response = control.forced_response(theirs, 0.2 * np.arange(40), step, squeeze=False)
         assert response.outputs == pytest.approx(system.step_response(40).values[:, 0], abs=1e-12)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("system", RANDOM)
+def test_python_control_has_the_same_continuous_system(system, form):
+    """Its samples at held inputs are the discrete system again."""
+    control = pytest.importorskip("control")
+    continuous = system.to_continuous()
+    theirs = continuous.to_control(form)
+    frequencies = np.array([0.03, 0.4, 1.7, 2.45])
+    found = theirs(2j * np.pi * frequencies, squeeze=False)
+    assert found == pytest.approx(continuous.respond(frequencies), rel=1e-12, abs=1e-12)
+    assert (theirs.dt, theirs.input_labels) == (0.0, list(system.input_names))
+    if form == "state-space":
+        sampled = control.sample_system(theirs, 0.2, "zoh")
+        for name in "ABCD":
+            assert getattr(sampled, name) == pytest.approx(getattr(system, name), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("system", RANDOM)
+def test_the_pade_approximation_is_the_dead_time_at_low_frequencies(system):
+    late = replace(system, dead_times=(0.4, 0.2, 0.0)[: len(system.input_names)]).to_continuous()
+    frequencies = np.array([0.0, 0.1, 0.7 / 0.4])
+    exact = late.respond(frequencies)
+    for order, errors in ((1, [1e-12, 2e-3, 2.0]), (4, [1e-12, 1e-9, np.radians(1.0)])):
+        found = late.expand_delays(pade=order)
+        assert found.order == late.order + order * np.count_nonzero(late.delays)
+        assert np.abs(found.respond(frequencies)) == pytest.approx(np.abs(exact), rel=1e-9, abs=1e-12)
+        assert (np.abs(found.respond(frequencies) - exact) <= np.multiply(errors, np.abs(exact).max())).all()
+    with pytest.raises(islands.ModelError, match="pade=4"):
+        late.expand_delays()
+
+
+@pytest.mark.parametrize("system", RANDOM)
+def test_a_continuous_system_is_described_as_the_discrete_one(system):
+    late = replace(system, dead_times=(0.4,) * len(system.input_names))
+    assert late.to_continuous().describe() == late.describe()
+    integrator = replace(make_integrator(), dt=0.1, input_names=("u",), output_names=("y",)).to_continuous()
+    assert integrator.describe() == ("a mode that does not decay (pole 0)",)
 
 
 def test_the_band_of_equal_members_is_the_response():

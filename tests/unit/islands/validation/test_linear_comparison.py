@@ -62,5 +62,6 @@ def test_a_result_states_the_ratio_to_a_linear_model(curved):
     linear, own = document["linear"], document["models"][document["recommended"]["rank"] - 1]
     errors = [each["metrics"]["validation"]["free_run"]["rmse"] for each in (linear, own)]
     assert errors[0] > 5.0 * errors[1]
-    stated = f"a linear model of {linear['size']} terms has {errors[0] / errors[1]:.3g} times the error."
+    size = f"{linear['size']} parameters ({linear['structure']})"
+    stated = f"a linear model of {size} has {errors[0] / errors[1]:.3g} times the error."
     assert sentences(document)["Error"].endswith(stated)

@@ -61,6 +61,14 @@ def test_a_report_of_no_folder_is_an_error_with_advice(command_line):
     assert (code, "there is no folder nothing" in error) == (2, True)
 
 
+def test_the_continuous_system_is_written_on_request(model, command_line):
+    write_model(make_model([(parse("y(k-1)"), 0.9), (parse("u(k-1)"), 0.1)], ("u",), dt=0.1), "timed.json")
+    code, out, _ = command_line("show", "timed.json", "--format", "transfer-function", "--continuous", "zoh")
+    assert (code, "s + 1.053605" in out, "time constant 0.9491 s" in out) == (0, True, True)
+    code, _, error = command_line("show", "timed.json", "--figure", "bode", "--continuous", "zoh")
+    assert (code, "--continuous is for the formats" in error) == (2, True)
+
+
 def test_a_linear_system_is_written_and_drawn_without_a_record(model, command_line, tmp_path):
     code, out, _ = command_line("show", "model.json", "--format", "transfer-function", "--at", "u=2")
     assert (code, "about u = 2" in out, "static gain of u 1" in out) == (0, True, True)
@@ -70,5 +78,9 @@ def test_a_linear_system_is_written_and_drawn_without_a_record(model, command_li
         assert command_line("show", "model.json", "--figure", "nyquist", "--out", "n.svg") == (0, "", "")
     code, _, error = command_line("show", "model.json", "--at", "u=2")
     assert (code, "--at is for the formats state-space, transfer-function" in error) == (2, True)
+    code, _, error = command_line("show", "model.json", "--continuous", "zoh")
+    assert (code, "--continuous is for the formats state-space, transfer-function" in error) == (2, True)
+    code, _, error = command_line("show", "model.json", "--format", "state-space", "--continuous", "zoh")
+    assert (code, "needs the sampling time of the model" in error) == (2, True)
     code, _, error = command_line("show", "model.json", "--format", "state-space", "--at", "u")
     assert (code, "--at u: write NAME=VALUE" in error) == (2, True)

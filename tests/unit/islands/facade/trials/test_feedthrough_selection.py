@@ -103,6 +103,22 @@ def found():
     return islands.fit(lag(white(0), 0), **LIBRARY)
 
 
+def make_impact(is_direct, samples=1200):
+    """An accelerometer or a sensor of position on a resonance that is hit once."""
+    force = np.zeros(samples)
+    force[30:35] = [0.2, 1.0, 1.4, 0.9, 0.1]
+    position = lfilter([0.0, 0.1], [1.0, -1.7, 0.97], force)
+    y = force + np.diff(position, 2, prepend=[0.0, 0.0]) if is_direct else position
+    return Dataset(force, y + 0.01 * np.std(y) * white(4, samples), 0.001, ("force_N",), "y")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("is_direct", [True, False])
+def test_an_impact_shows_whether_the_output_responds_at_once(is_direct):
+    chosen = select_feedthrough(split(make_impact(is_direct)), "auto", TRIAL)
+    assert chosen.estimation.input_names == (("force_N+1",) if is_direct else ("force_N",))
+
+
 def test_the_setting_decides_without_a_test():
     data = split(Dataset(np.column_stack([white(0), white(1)]), white(2), 1.0, ("a+1", "b")))
     assert select_feedthrough(data, "no", TRIAL) is data

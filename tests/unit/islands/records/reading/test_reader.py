@@ -9,7 +9,7 @@ import pytest
 from islands.errors import IslandsError, RecordError
 from islands.records.channel_names import parse_unit
 from islands.records.reading import READERS, fingerprint, read_record
-from islands.records.reading.column_names import looks_like_time
+from islands.records.reading.column_names import find_column, looks_like_time
 from support.bad_records import refusal
 
 SAMPLES = 50
@@ -140,6 +140,23 @@ def test_a_column_with_another_name_is_not_the_time(name):
 )
 def test_a_unit_follows_the_last_underscore_or_is_in_brackets(name, unit):
     assert parse_unit(name) == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "found"),
+    [
+        ("pump", ("pump [%]", "level [cm]"), "pump [%]"),
+        ("force", ("Time/s", "force/N"), "force/N"),
+        ("acc", ("acc/(m/s^2)",), "acc/(m/s^2)"),
+        ("force+1", ("force/N",), "force/N"),
+        ("u", ("u/V", "u"), "u"),
+        ("u", ("u/V", "u/mV"), "u"),
+        ("a", ("a/b",), "a"),
+        ("u", ("u_V",), "u"),
+    ],
+)
+def test_a_name_without_its_unit_finds_the_only_column_with_one(name, columns, found):
+    assert find_column(name, columns) == found
 
 
 # Rows

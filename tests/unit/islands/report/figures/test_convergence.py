@@ -12,7 +12,7 @@ def make_result(history=(), models=()):
     """Return a stub of a result with the attributes that the figures read."""
     entries = tuple(
         SimpleNamespace(
-            model=SimpleNamespace(size=size),
+            model=SimpleNamespace(free_size=size),
             metrics={
                 part: {"free_run": SimpleNamespace(mape=error)}
                 for part, error in (("estimation", estimation), ("validation", validation))
