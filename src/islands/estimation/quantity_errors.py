@@ -91,6 +91,8 @@ def with_quantity_errors(
     influences = np.einsum("qg,gk->qk", effects, jacobian)
     variances = np.array([sandwich(each[None], error)[0, 0] for each in influences])
     variances *= (error.size - 1) / max(1, error.size - int(np.count_nonzero(kept)))
+    # A dead time of whole samples is chosen, not estimated.
+    variances[[each.name == "dead time" for each in model.quantities]] = np.nan
     return replace(model, quantity_errors=tuple(np.sqrt(variances).tolist()))
 
 

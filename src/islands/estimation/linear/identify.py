@@ -26,7 +26,7 @@ from islands.estimation.linear.sections import INTEGRATORS, Signal, Signals, fin
 from islands.estimation.linear.starts import HighOrder, fit_high_order, grid_pairs, grid_real
 from islands.progress import Steps
 
-#: Largest number of poles that is tried by default.
+#: Largest number of poles, unless another one is given.
 LARGEST_ORDER = 12
 
 #: Samples of the part of a record on which starts and dead times are searched.

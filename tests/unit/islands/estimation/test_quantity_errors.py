@@ -119,3 +119,12 @@ def test_constraints_determine_quantities():
         for each in ("none", text)
     ]
     assert 0.0 < moved[1] < moved[0]
+
+
+def test_a_dead_time_of_whole_samples_has_no_standard_error():
+    late = replace(WIENER, delays=(3,))
+    found = with_quantity_errors(late, make_record(WIENER, 2))
+    names = [each.name for each in found.quantities]
+    known = np.isfinite(found.quantity_errors)
+    assert known.tolist() == [name != "dead time" for name in names]
+    assert "dead time" in names
