@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from itertools import accumulate
 from typing import ClassVar
 
@@ -143,11 +144,17 @@ class CoupledLatentModel(CoupledModel):
 
     def block(self) -> Block:
         """Return the difference equations of all models; the states are numbered one after the other."""
-        return self._join([model.block() for model in self._number()])
+        return _make_block(self)
+
+    def make_block(self) -> Block:
+        """Return a new block; `block` returns that of recent models again, since many states take long."""
+        return self._join([model.make_block() for model in self._number()])
 
     def measured_block(self) -> Block:
         """Return the block of the measured signals, with the offsets in its equations."""
-        found = self._join([subtract_offsets(each.block(), each.preprocessing) for each in self._number()])
+        found = self._join(
+            [subtract_offsets(each.make_block(), each.preprocessing) for each in self._number()]
+        )
         done = [each.preprocessing for each in self.models if each.preprocessing]
         if not any(value for each in done for value in (each.output_offset, *each.input_offsets)):
             return found
@@ -246,6 +253,11 @@ class CoupledLatentModel(CoupledModel):
             ),
             levels={name: level for block in blocks for name, level in block.levels.items()},
         )
+
+
+@lru_cache(maxsize=16)
+def _make_block(model: CoupledLatentModel) -> Block:
+    return model.make_block()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -274,27 +274,45 @@ def _link(block: Block) -> tuple[Program, list[int | None]]:
     names = list(block.parameters)
     places = {name: place for place, name in enumerate(names)}
     terms = [term for equation in block.equations for term in equation]
-    program = link([_read_past(block, term.expression) for term in terms], names)
+    read_past = _PastReader(block)
+    program = link([read_past(term.expression) for term in terms], names)
     return program, [places[term.weight] if term.weight else None for term in terms]
 
 
-def _read_past(block: Block, expression: Expression) -> Expression:
-    """Replace sample k of the states by their equations: the kernel evaluates all equations at once."""
+class _PastReader:
+    """Replaces sample k of the states by their equations: the kernel evaluates all equations at once.
 
-    def find(part: Expression) -> Expression | None:
-        return _sum_terms(block, part.channel) if isinstance(part, Lagged) and part.lag == 0 else None
+    Equations share units, and every output reads all states: each is replaced once.
+    """
 
-    return replace(remove_shifts(expression), find)
+    def __init__(self, block: Block) -> None:
+        self._block = block
+        self._read: dict[Expression, Expression] = {}
+        self._sums: dict[int, Expression] = {}
 
+    def __call__(self, expression: Expression) -> Expression:
+        """Return an expression of past samples, and of the inputs."""
+        found = self._read.get(expression)
+        if found is None:
+            found = self._read[expression] = replace(remove_shifts(expression), self._find)
+        return found
 
-def _sum_terms(block: Block, channel: int) -> Expression:
-    """Return the right side of the equation of a signal."""
-    terms = [
-        Apply(MUL, (Symbol(term.weight), term.expression)) if term.weight else term.expression
-        for term in block.equations[channel]
-    ]
-    read = [_read_past(block, term) for term in terms]
-    return read[0] if len(read) == 1 else Apply(ADD, tuple(read))
+    def _find(self, part: Expression) -> Expression | None:
+        if not (isinstance(part, Lagged) and part.lag == 0):
+            return None
+        found = self._sums.get(part.channel)
+        if found is None:
+            found = self._sums[part.channel] = self._sum_terms(part.channel)
+        return found
+
+    def _sum_terms(self, channel: int) -> Expression:
+        """Return the right side of the equation of a signal."""
+        terms = [
+            Apply(MUL, (Symbol(term.weight), term.expression)) if term.weight else term.expression
+            for term in self._block.equations[channel]
+        ]
+        read = [self(term) for term in terms]
+        return read[0] if len(read) == 1 else Apply(ADD, tuple(read))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
