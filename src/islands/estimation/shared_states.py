@@ -8,7 +8,8 @@ so that the models have units of one argument, as all latent models (see `linear
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,13 @@ from islands.estimation.linear.frequency_response import estimate_response
 from islands.estimation.linear.spectral_fit import (
     ResponseAtAmplitude,
     SharedSystem,
+    draw_systems,
     fit_shared_system,
     refine,
     schedule,
 )
 from islands.kernels.linear_filter import divide_rows
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.progress import Steps
 from islands.records.coupled import CoupledRecord
@@ -41,30 +44,46 @@ _DIFFERENT, _MOST_AMPLITUDES = 1.25, 4
 #: Largest ripple of the amplitude of a stationary input, relative to its mean.
 _RIPPLE = 0.05
 
+#: Draws from the distribution of the parameters. A free run of each is a member of the bands.
+_DRAWS = 24
+
 #: Samples for each state from which the initial states of a free run of the result are estimated, at least.
 _SAMPLES_PER_STATE = 3
 
 
-def search_shared_models(
-    record: CoupledRecord, seed: int, steps: Steps, least_order: int = 0
-) -> list[tuple[LatentModel, ...]]:
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedModel:
+    """State space whose states all outputs share, and its uncertainty.
+
+    Attributes
+    ----------
+    model : CoupledLatentModel
+    size : int
+        Number of parameters that have an effect: coordinates of the states have none.
+    draws : ndarray, shape (draws, parameters)
+        Parameters of the model from the distribution of the estimate.
+    """
+
+    model: CoupledLatentModel
+    size: int
+    draws: Signal
+
+
+def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list[SharedModel]:
     """Search state spaces whose states all outputs share.
 
     Parameters
     ----------
     record : CoupledRecord
     seed : int
-        Of the starts of the effect of the amplitude.
+        Of the starts of the effect of the amplitude, and of the draws.
     steps : Steps
-    least_order : int
-        A state space of a smaller order is not returned.
 
     Returns
     -------
-    list of tuple of LatentModel
-        One model for each output: of a linear system, and of one with an effect of the amplitude if the
-        record has different amplitudes. Empty if the record is too short, lacks outputs or has a constant
-        column.
+    list of SharedModel
+        A linear system, and one with an effect of the amplitude if the record has different amplitudes.
+        Empty if the record is too short, lacks outputs or has a constant column.
     """
     if min(record.segments) < _SHORTEST or not np.isfinite(record.y).all():
         return []
@@ -76,23 +95,60 @@ def search_shared_models(
     steps.report("linear state space with shared states", 0.0)
     # The sums of a matrix product depend on the number of threads of the library.
     with threadpool_limits(1, user_api="blas"):
-        data, amplitudes = _measure_responses(record, u, y)
+        data, mean, unit = _measure_responses(record, u, y)
         system = fit_shared_system(data, _LARGEST_ORDER) if data else None
-        if system is None or system.order < least_order:
+        if system is None or not system.order:
             return []
         equal = np.mean([each.response.variances for each in data], axis=0)
         alike = [replace(each, response=replace(each.response, variances=equal)) for each in data]
         linear = refine(system, alike) if len(data) > 1 else system
-        found = [_make_models(linear, None, record, scales, u)]
+        signals = _Signals(record, scales, u)
+        found = [_make_model(linear, alike, None, signals, seed)]
         if len(data) > 1 and not steps.skip("effect of the amplitude"):
             steps.report("effect of the amplitude on the state space", 0.3)
-            found.append(_make_models(schedule(system, data, seed), amplitudes, record, scales, u))
+            amplitude = _Amplitude(mean, unit, _find_forgetting(u, record))
+            found.append(_make_model(schedule(system, data, seed), data, amplitude, signals, seed))
     return found
+
+
+class _Amplitude(NamedTuple):
+    """Mean amplitude of a record, the unit of its deviation, and the pole of the state that follows it."""
+
+    mean: float
+    unit: float
+    pole: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Signals:
+    """A record, the scales of every output, and the scaled inputs."""
+
+    record: CoupledRecord
+    scales: Sequence[SignalScales]
+    u: Signal
+
+
+def _make_model(
+    system: SharedSystem,
+    data: Sequence[ResponseAtAmplitude],
+    amplitude: _Amplitude | None,
+    signals: _Signals,
+    seed: int,
+) -> SharedModel:
+    """Return the model of a system that was fitted to the responses, with draws of its parameters."""
+    units = _measure_states(system)
+    drawn = draw_systems(system, data, _DRAWS, np.random.default_rng(seed))
+    model, *draws = (
+        CoupledLatentModel(_write_outputs(each, amplitude, signals, units)) for each in (system, *drawn)
+    )
+    # A draw has the parameters of the model, unless one of them is exactly zero.
+    kept = [each.parameters for each in draws if each.parameter_names == model.parameter_names]
+    return SharedModel(model, system.size, np.array(kept or [model.parameters]))
 
 
 def _measure_responses(
     record: CoupledRecord, u: Signal, y: Signal
-) -> tuple[list[ResponseAtAmplitude], tuple[float, float]]:
+) -> tuple[list[ResponseAtAmplitude], float, float]:
     """Return the responses at different amplitudes, a middle one first, and the mean and unit of these."""
     length = min(_LONGEST, *record.segments)
     first = [
@@ -115,12 +171,12 @@ def _measure_responses(
         if response is not None:
             found.append(ResponseAtAmplitude(response, float(sizes[group].mean())))
     if not found:
-        return [], (0.0, 1.0)
+        return [], 0.0, 1.0
     middle = found[len(found) // 2]
     mean, unit = middle.amplitude, max(abs(each.amplitude - middle.amplitude) for each in found) or 1.0
     ordered = [middle, *(each for each in found if each is not middle)]
     scaled = [replace(each, amplitude=(each.amplitude - mean) / unit) for each in ordered]
-    return scaled, (mean, unit)
+    return scaled, mean, unit
 
 
 def _find_forgetting(u: Signal, record: CoupledRecord) -> float:
@@ -138,12 +194,11 @@ def _find_forgetting(u: Signal, record: CoupledRecord) -> float:
     return pole
 
 
-def _make_models(
+def _write_outputs(
     system: SharedSystem,
-    amplitudes: tuple[float, float] | None,
-    record: CoupledRecord,
-    scales: Sequence[SignalScales],
-    u: Signal,
+    amplitude: _Amplitude | None,
+    given: _Signals,
+    state_units: tuple[Signal, Signal],
 ) -> tuple[LatentModel, ...]:
     """Return the model of every output in the units of the record.
 
@@ -151,27 +206,25 @@ def _make_models(
     ----------
     system : SharedSystem
         Of scaled signals.
-    amplitudes : (float, float) or None
-        Mean amplitude, and the unit of its deviation; None of a linear system.
-    record : CoupledRecord
-    scales : sequence of SignalScales
-        Of every output.
-    u : ndarray, shape (samples, inputs)
-        Scaled inputs.
+    amplitude : _Amplitude or None
+        None of a linear system.
+    given : _Signals
+    state_units : (ndarray, ndarray)
+        Units of the states, and of the signals of the feedback.
     """
+    record, scales = given.record, given.scales
     order, inputs = system.b.shape
-    signals = system.signals if amplitudes else 0
+    signals = system.signals if amplitude else 0
     extra = 1 if signals else 0
     layout = StateSpaceLayout(order + extra, inputs, inputs * extra + 2 * signals)
     theta = np.zeros(len(layout.names))
     blocks = layout.split(theta)
-    scale, products = _measure_states(system)
+    scale, products = state_units
     blocks["A"][:order, :order] = system.a * scale / scale[:, None]
     blocks["B"][:order] = system.b / scale[:, None]
     units: tuple[str, ...] = ()
-    if amplitudes:
-        mean, unit = amplitudes
-        pole = _find_forgetting(u, record)
+    if amplitude:
+        mean, unit, pole = amplitude
         units = ("abs",) * inputs + ("square",) * (2 * signals)
         blocks["A"][order, order] = pole
         blocks["o"][order] = -(1.0 - pole) * mean / unit
@@ -190,18 +243,18 @@ def _make_models(
         blocks = layout.split(of_output)
         blocks["C"][:order] = system.c[place] * scale
         blocks["D"][...] = system.d[place]
-        if amplitudes:
+        if amplitude:
             for begin, sign in ((inputs, 1.0), (inputs + signals, -1.0)):
                 blocks["F"][begin : begin + signals] = sign * 0.25 * products * system.f[place]
         models.append(
-            _make_model(
+            _write_output(
                 own.use_record_units(layout, of_output), layout, units, radius, own, each, system.is_direct
             )
         )
     return tuple(models)
 
 
-def _make_model(
+def _write_output(
     theta: Signal,
     layout: StateSpaceLayout,
     units: tuple[str, ...],

@@ -208,6 +208,8 @@ class CoupledSearchResult:
         Separate result of every output; empty if one search has found the model of all of them.
     refusal : str
         Why the optional facts of the document are not computed; empty if they are.
+    reasons : tuple of str
+        Why the model is recommended; empty if it was compared with no other one.
     """
 
     record: CoupledRecord
@@ -218,6 +220,7 @@ class CoupledSearchResult:
     models: tuple[CoupledAssessment, ...]
     outputs: tuple[SearchResult, ...] = ()
     refusal: str = ""
+    reasons: tuple[str, ...] = ()
 
     @property
     def average(self) -> int:
@@ -243,7 +246,7 @@ class CoupledSearchResult:
     @property
     def recommendation(self) -> Recommendation:
         """Rank of the recommended model: the first one."""
-        return Recommendation(1, (), 1, ())
+        return Recommendation(1, self.reasons, 1, ())
 
     @property
     def recommended(self) -> CoupledAssessment:

@@ -211,14 +211,13 @@ class Assessment:
 
         The variance of a mean of squares of correlated normal values is that of so many independent ones.
         """
-        known = self.errors[~np.isnan(self.errors)]
         split = self.checks.split
-        samples = float(split.estimation.samples + split.validation.samples)
-        power, lags = float(np.add.reduce(known**2)), range(1, isqrt(known.size) + 1)
-        if not power > 0.0:
-            return samples
-        correlations = [float(np.add.reduce(known[lag:] * known[:-lag])) / power for lag in lags]
-        return max(2.0, samples / (1.0 + 2.0 * sum(each**2 for each in correlations)))
+        return count_effective(self.errors, split.estimation.samples + split.validation.samples)
+
+    @property
+    def unexplained(self) -> float:
+        """Part of the variance of the output that the free run on the validation data does not explain."""
+        return 1.0 - self.metrics["validation"]["free_run"].r2
 
     @property
     def squared_errors(self) -> NDArray[np.float64]:
@@ -248,6 +247,16 @@ class Assessment:
     def has_estimated_start(self) -> bool:
         """Whether the free run on the validation data starts from estimated outputs."""
         return self.checks.has_estimated_start
+
+
+def count_effective(errors: NDArray[np.float64], samples: int) -> float:
+    """Return how many of the samples are independent, by the autocorrelation of errors; NaN is left out."""
+    known = errors[~np.isnan(errors)]
+    power, lags = float(np.add.reduce(known**2)), range(1, isqrt(known.size) + 1)
+    if not power > 0.0:
+        return float(samples)
+    correlations = [float(np.add.reduce(known[lag:] * known[:-lag])) / power for lag in lags]
+    return max(2.0, samples / (1.0 + 2.0 * sum(each**2 for each in correlations)))
 
 
 def assess(

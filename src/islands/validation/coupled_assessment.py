@@ -3,12 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import nan
+from math import inf, isnan, log, nan
+
+import numpy as np
+from numpy.typing import NDArray
 
 from islands.models.coupled_narx import CoupledModel
 from islands.records.coupled import CoupledRecord, CoupledSplit
+from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run, one_step_ahead
-from islands.validation.assessment import PARTS
+from islands.validation.assessment import PARTS, count_effective
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import OutputBands
@@ -29,7 +33,7 @@ class CoupledAssessment:
         Whether the parameters were refined on the common free run. If not, they are those of separate
         searches.
     ranks : tuple of int
-        Rank of the model of each output in its separate search.
+        Rank of the model of each output in its separate search; empty if all outputs have one search.
     bands : OutputBands or None
         Prediction bands of every output. None if the free run of the model diverges, or the search was
         stopped before them.
@@ -70,6 +74,60 @@ class CoupledAssessment:
                 {mode: metrics(data.y, y if outcome else y * nan) for mode, (y, outcome) in runs.items()}
             )
         return found
+
+    @cached_property
+    def errors(self) -> NDArray[np.float64]:
+        """Error of the common free run at every sample of the validation data, relative to the ranges.
+
+        Shape (samples, outputs); NaN in the warm-up, and everywhere after a divergence.
+        """
+        data = self.split.validation
+        run = free_run(self.model, data, self.warm_up)
+        ranges = np.array([each.output_range or 1.0 for each in data.records])
+        found: NDArray[np.float64] = (run.y - data.y) / ranges
+        return found if run.outcome else found * nan
+
+    @property
+    def squared_errors(self) -> NDArray[np.float64]:
+        """Mean over the outputs of the squares of the errors, shape (samples,); empty after a divergence."""
+        squares: NDArray[np.float64] = np.mean(self.errors**2, axis=1)
+        return squares if np.isfinite(squares).any() else squares[:0]
+
+    @property
+    def validation_error(self) -> float:
+        """Root of the mean of these squares; infinite after a divergence."""
+        squares = self.squared_errors
+        return float(np.sqrt(np.nanmean(squares))) if squares.size else inf
+
+    @property
+    def mean_square(self) -> float:
+        """Geometric mean over the outputs of the mean squared error of the common free run on all data.
+
+        The likelihood of independent normal errors with unknown variances depends on it. Errors below the
+        resolution of files are equal; infinite after a divergence.
+        """
+        logarithms = []
+        records = zip(self.split.estimation.records, self.split.validation.records, strict=True)
+        for parts, errors in zip(records, self.metrics.values(), strict=True):
+            squares = [
+                errors[part]["free_run"].rmse ** 2 * each.samples
+                for part, each in zip(PARTS, parts, strict=True)
+            ]
+            scale = parts[0].output_range or 1.0
+            mean = sum(squares) / sum(each.samples for each in parts) / scale**2
+            logarithms.append(inf if isnan(mean) else log(max(mean, RESOLUTION**2)))
+        return float(np.exp(np.mean(logarithms)))
+
+    @property
+    def effective_samples(self) -> float:
+        """Number of independent errors of all outputs; see `Assessment.effective_samples`."""
+        samples = self.split.estimation.samples + self.split.validation.samples
+        return sum(count_effective(each, samples) for each in self.errors.T)
+
+    @property
+    def unexplained(self) -> float:
+        """Mean over the outputs of the part of the variance that the free run does not explain."""
+        return float(np.mean([1.0 - each["validation"]["free_run"].r2 for each in self.metrics.values()]))
 
     def measure_residual(self, place: int) -> ResidualStructure:
         """Measure the residuals of an output on the longest recording of the validation data."""

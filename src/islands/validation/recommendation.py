@@ -24,17 +24,20 @@ The setting ``select`` can replace this rule by the paper's choice of Appendix A
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isinf, isnan, log, sqrt
+from math import inf, isfinite, isinf, isnan, log, sqrt
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.expressions.tree import Constant, Lagged
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
+from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import LARGEST_ESTIMATION_RATIO
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
@@ -52,7 +55,7 @@ _EXCESS_BY_CHANCE = 0.5
 
 #: Largest error on the validation data, and then on the estimation data, relative to the least, of a model
 #: that is compared.
-_LARGEST_RATIO = 2.0
+LARGEST_RATIO = 2.0
 
 #: Distance of the output at held inputs from its recorded range, in ranges, that is not stated.
 _NEAR = 1.0
@@ -80,6 +83,9 @@ _BESIDES_ERROR = (INFORMATION, PROPERTY_1, ESTIMATION_ERROR, *_OF_EQUALS)
 BLOCKS = 20
 
 _ONE = Constant(1.0)
+
+#: A model of one or several outputs with its errors.
+Comparable: TypeAlias = Assessment | CoupledAssessment
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +141,15 @@ class _Selection:
             self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
-def is_linear(model: DynamicModel) -> bool:
+def _list_terms(model: DynamicModel) -> Sequence[str]:
+    """Return the terms of a model that were chosen among others."""
+    return model.parameter_names if isinstance(model, Model) else ()
+
+
+def is_linear(model: AnyModel) -> bool:
     """Return whether the next output of a model is linear in its inputs and its states."""
+    if isinstance(model, CoupledModel):
+        return all(map(is_linear, model.models))
     if isinstance(model, LatentModel):
         return not model.units
     return isinstance(model, Model) and all(
@@ -193,13 +206,14 @@ def recommend(
         )
     selection = _Selection(len(assessments))
     selection.keep(DIVERGENCE, bounded)
-    selection.keep(INFORMATION, _keep_informative(bounded, sizes, assessments))
+    terms = {name for entry in assessments for name in _list_terms(entry.model)}
+    selection.keep(INFORMATION, _keep_informative(bounded, sizes, assessments, len(terms)))
     if hysteresis:
         selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
     selection.keep(
-        VALIDATION_ERROR, _pass_over(selection.left, assessments, _LARGEST_RATIO, _measure_validation)
+        VALIDATION_ERROR, _pass_over(selection.left, assessments, LARGEST_RATIO, _measure_validation)
     )
-    selection.keep(ESTIMATION_ERROR, _pass_over(selection.left, assessments, _LARGEST_RATIO))
+    selection.keep(ESTIMATION_ERROR, _pass_over(selection.left, assessments, LARGEST_RATIO))
     reference = min(selection.left, key=lambda at: (assessments[at].validation_error, at))
     best = assessments[reference]
     selection.keep(WORSE, [at for at in selection.left if _is_equal(assessments[at], best)])
@@ -215,23 +229,26 @@ def recommend(
 
 
 def _keep_informative(
-    places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Assessment]
+    places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Comparable], terms: int
 ) -> list[int]:
     """Return the nonlinear models that are better than the best linear one, or the latter alone.
 
     Of linear models, the one with the least criterion is the best. A nonlinear one is better if its criterion
     is less, or if the validation data show a significant difference and more than a constant output.
+
+    Parameters
+    ----------
+    places : sequence of int
+        Models with a bounded free run.
+    sizes, assessments
+        Of all models.
+    terms : int
+        Number of terms among which nonlinear models choose.
     """
     linear = [at for at in places if is_linear(assessments[at].model)]
     if not linear:
         return list(places)
-    terms = {
-        name
-        for entry in assessments
-        if isinstance(entry.model, Model)
-        for name in entry.model.parameter_names
-    }
-    choice = 2.0 * log(max(1, len(terms)))
+    choice = 2.0 * log(max(1, terms))
 
     def gain(at: int, other: int) -> float:
         """Return by how much the criterion of a model is smaller than that of another one."""
@@ -249,11 +266,34 @@ def _keep_informative(
 
     def is_better(at: int) -> bool:
         one, other = assessments[at], assessments[best]
-        unexplained = 1.0 - one.metrics["validation"]["free_run"].r2
-        shows_motion = unexplained * (1.0 + LARGEST_EXCESS) ** 2 < 1.0
+        shows_motion = one.unexplained * (1.0 + LARGEST_EXCESS) ** 2 < 1.0
         return gain(at, best) > 0.0 or (shows_motion and not _is_as_good(other, one))
 
     return [at for at in places if at not in linear and is_better(at)] or [best]
+
+
+def recommend_joint(
+    sizes: Sequence[float], assessments: Sequence[CoupledAssessment], terms: int
+) -> CoupledAssessment:
+    """Return the linear model of several outputs, or the smallest nonlinear one that is as good as the best.
+
+    The rule is that of `recommend`, on the common free runs. If all of them diverge, it is the first model.
+
+    Parameters
+    ----------
+    sizes : sequence of float
+        Numbers of parameters that have an effect.
+    assessments : sequence of CoupledAssessment
+    terms : int
+        Number of terms among which equations choose.
+    """
+    bounded = [at for at, entry in enumerate(assessments) if isfinite(entry.mean_square)]
+    if not bounded:
+        return assessments[0]
+    kept = _keep_informative(bounded, sizes, assessments, terms)
+    best = min(kept, key=lambda at: assessments[at].validation_error)
+    equal = [at for at in kept if _is_as_good(assessments[at], assessments[best])]
+    return assessments[min(equal, key=lambda at: sizes[at], default=best)]
 
 
 def recommend_fittest(
@@ -314,7 +354,7 @@ def describe_exclusion(exclusion: Exclusion, assessments: Sequence[Assessment]) 
     if exclusion.reason == CHECKS:
         return _describe_divergence([assessments[rank - 1].physics for rank in exclusion.ranks])
     of_equals = exclusion.reason in _OF_EQUALS
-    ratio, least = (LARGEST_ESTIMATION_RATIO, " of these") if of_equals else (_LARGEST_RATIO, "")
+    ratio, least = (LARGEST_ESTIMATION_RATIO, " of these") if of_equals else (LARGEST_RATIO, "")
     return f"with more than {ratio:g} times the least error{least} on the estimation data"
 
 
@@ -339,7 +379,7 @@ def _is_equal(entry: Assessment, reference: Assessment) -> bool:
     return _is_as_good(entry, reference) or _is_as_good_in_estimation(entry, reference)
 
 
-def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
+def _is_as_good(entry: Comparable, reference: Comparable) -> bool:
     """Return whether the error on the validation data does not differ significantly from the reference."""
     blocks = compare_blocks(entry.squared_errors, reference.squared_errors)
     if not blocks.size:

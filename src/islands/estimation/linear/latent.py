@@ -1,5 +1,6 @@
 """Linear model of a record as a latent model without units, which every use of a model takes."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from math import inf, isfinite, log, nan
@@ -13,10 +14,12 @@ from islands.estimation.linear.model import LinearModel
 from islands.estimation.linear.sections import Signal
 from islands.estimation.modal_form import find_modal_form
 from islands.kernels.state_space import simulate_states
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.models.state_space import Quantity
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
+from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
 
 #: Samples for each state, samples, and part of the shortest recording that give initial states.
@@ -66,41 +69,54 @@ def identify_linear_models(record: Dataset, steps: Steps | None = None) -> list[
     """
     shared = _share_models(record)
     if not shared:
-        shared += _identify(record, steps)
+        shared += [model for (model,) in _identify([record], steps)]
     return shared
 
 
-def _identify(record: Dataset, steps: Steps | None) -> list[LatentModel]:
+def identify_joint_model(record: CoupledRecord, steps: Steps | None = None) -> CoupledLatentModel:
+    """Identify a linear model whose outputs share the poles; see `identify_linear_model`."""
+    return CoupledLatentModel(next(_identify(record.records, steps)))
+
+
+def _identify(records: Sequence[Dataset], steps: Steps | None) -> Iterator[tuple[LatentModel, ...]]:
+    """Yield the models of all outputs of records that share the inputs: the best ones, then other orders."""
+    record = records[0]
     early = [int(parse_channel_name(name).at_once) for name in record.input_names]
     late = max(early)
     rows = [np.arange(begin + late, end) for begin, end in record.bounds if end - begin > late]
     kept = np.concatenate(rows)
     u = np.column_stack([record.u[kept - lead, place] for place, lead in enumerate(early)])
     lengths = [each.size for each in rows]
-    found = list(identify_orders(u, record.y[kept], record.dt, lengths, feedthrough=all(early), steps=steps))
-    causal = [each for each in found if not each.d[0][each.delays[0] + early == 0].any()]
-    if found[0] not in causal:
-        raise RecordError("the output follows the input within a sample: read the inputs one sample early")
-    return [make_latent_model(each, record, u) for each in causal]
+    y = np.column_stack([each.y[kept] for each in records])
+    orders = identify_orders(u, y, record.dt, lengths, feedthrough=all(early), steps=steps)
+    for place, found in enumerate(orders):
+        if found.d[found.delays + early == 0].any():
+            if not place:
+                raise RecordError(
+                    "the output follows the input within a sample: read the inputs one sample early"
+                )
+            continue
+        yield tuple(make_latent_model(found, each, u, output) for output, each in enumerate(records))
 
 
-def make_latent_model(found: LinearModel, record: Dataset, u: Signal) -> LatentModel:
-    """Return a linear model of the first output with states of the standard deviation 1.
+def make_latent_model(found: LinearModel, record: Dataset, u: Signal, output: int = 0) -> LatentModel:
+    """Return the linear model of an output with states of the standard deviation 1.
 
     Parameters
     ----------
     found : LinearModel
     record : Dataset
-        Record with the columns and the recordings of the model.
+        Record of the output with the columns and the recordings of the model.
     u : ndarray, shape (rows, inputs)
         Inputs of the record.
+    output : int
     """
     layout = StateSpaceLayout(found.order, u.shape[1], 0)
     modal = find_modal_form(found.a) if found.order else None
     a, forward = modal or (found.a, np.eye(found.order))
-    b, drift = (np.linalg.solve(forward, each) for each in (found.b[0], found.drift[0]))
-    c, d, level = found.c @ forward, found.d[0], float(found.y0[0])
-    if found.drift[0].any():
+    b, drift = (np.linalg.solve(forward, each) for each in (found.b[output], found.drift[output]))
+    c, d, level = found.c @ forward, found.d[output], float(found.y0[output])
+    if found.drift[output].any():
         drift = drift - b @ found.u0
     else:
         level -= float(c @ np.linalg.solve(np.eye(found.order) - a, b @ found.u0))
@@ -113,16 +129,16 @@ def make_latent_model(found: LinearModel, record: Dataset, u: Signal) -> LatentM
     model = LatentModel(
         order=found.order,
         wiring=tuple(name for name, _ in named),
-        memory=_choose_memory(found.poles, record) + int(max(found.delays[0] + early)),
+        memory=_choose_memory(found.poles, record) + int(max(found.delays[output] + early)),
         operating_inputs=tuple(found.u0.tolist()),
-        delays=tuple(found.delays[0].tolist()),
+        delays=tuple(found.delays[output].tolist()),
         parameters=tuple(value for _, value in named),
         input_names=record.input_names,
         output_name=record.output_name,
         dt=record.dt,
         preprocessing=record.preprocessing,
     )
-    return replace(model, quantity_errors=_match_errors(model.quantities, found))
+    return replace(model, quantity_errors=_match_errors(model.quantities, found, output))
 
 
 def _measure_states(a: Signal, b: Signal, u: Signal) -> Signal:
@@ -147,9 +163,9 @@ def _choose_memory(poles: NDArray[np.complex128], record: Dataset) -> int:
     return 1 + round(max(_SAMPLES_PER_STATE * len(poles), min(_LARGEST_MEMORY - 1, decay, shortest)))
 
 
-def _match_errors(quantities: tuple[Quantity, ...], found: LinearModel) -> tuple[float, ...]:
+def _match_errors(quantities: tuple[Quantity, ...], found: LinearModel, output: int) -> tuple[float, ...]:
     """Return the standard error of each quantity of a model: that of the nearest one of the same kind."""
-    left = list(zip(found.quantities[0], found.errors[0], strict=True))
+    left = list(zip(found.quantities[output], found.errors[output], strict=True))
     errors: list[float] = []
     for each in quantities:
         distances = [

@@ -35,6 +35,9 @@ _DAMPING, _EASIER, _HARDER, _FAILURES = 1e-3, 0.2, 4.0, 8
 #: Starts of the effect of the amplitude, and the change of a pole that the weights of one make about.
 _STARTS, _SMALL = 2, 1e-3
 
+#: Information of a direction, relative to the largest, up to which it is a change of the coordinates.
+_NO_EFFECT = 1e-12
+
 #: Least difference of two real poles of a section, from which it may pass to a complex pair.
 _LEAST_DISTANCE = 1e-3
 
@@ -314,14 +317,7 @@ def refine(system: SharedSystem, data: Sequence[ResponseAtAmplitude]) -> SharedS
     system = replace(system, deviance=_measure(system, data))
     damping = _DAMPING
     for _ in range(_STEPS):
-        normal, side = 0.0, 0.0
-        for each in data:
-            factors = _Factors(system, each)
-            slopes = factors.differentiate(system, each.amplitude)
-            rows = np.concatenate([slopes.real, slopes.imag])
-            errors = factors.error.reshape(-1)
-            normal = normal + rows.T @ rows
-            side = side + rows.T @ np.concatenate([errors.real, errors.imag])
+        normal, side = _sum_products(system, data)
         unit = np.sqrt(np.diag(normal))
         unit[unit == 0.0] = 1.0
         scaled = normal / np.outer(unit, unit)
@@ -338,6 +334,53 @@ def refine(system: SharedSystem, data: Sequence[ResponseAtAmplitude]) -> SharedS
         if not system.deviance < (1.0 - _DECREASE) * before:
             break
     return system
+
+
+def _sum_products(system: SharedSystem, data: Sequence[ResponseAtAmplitude]) -> tuple[Matrix, Matrix]:
+    """Return the products of the derivatives with each other, and with the errors."""
+    normal, side = 0.0, 0.0
+    for each in data:
+        factors = _Factors(system, each)
+        slopes = factors.differentiate(system, each.amplitude)
+        rows = np.concatenate([slopes.real, slopes.imag])
+        errors = factors.error.reshape(-1)
+        normal = normal + rows.T @ rows
+        side = side + rows.T @ np.concatenate([errors.real, errors.imag])
+    return np.asarray(normal), np.asarray(side)
+
+
+def draw_systems(
+    system: SharedSystem, data: Sequence[ResponseAtAmplitude], draws: int, generator: np.random.Generator
+) -> list[SharedSystem]:
+    """Draw systems from the distribution of the estimate, a normal one with the inverse of the information.
+
+    The error of a complex line has half of its variance in each part. A lack of fit increases the variances.
+    Coordinates of the states have no information, and are not moved.
+
+    Parameters
+    ----------
+    system : SharedSystem
+        Result of `refine` with these data.
+    data : sequence of ResponseAtAmplitude
+    draws : int
+    generator : Generator
+
+    Returns
+    -------
+    list of SharedSystem
+        Stable systems; fewer than ``draws`` if a step leads to an unstable one.
+    """
+    normal, _ = _sum_products(system, data)
+    unit = np.sqrt(np.diag(normal))
+    unit[unit == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(normal / np.outer(unit, unit))
+    kept = values > _NO_EFFECT * values[-1]
+    degrees = sum(each.response.values.size for each in data) - 0.5 * np.count_nonzero(kept)
+    variance = 0.5 * system.deviance / max(degrees, 1.0)
+    axes = vectors[:, kept] * np.sqrt(variance / values[kept]) / unit[:, None]
+    moved = [_move(system, axes @ each) for each in generator.standard_normal((draws, axes.shape[1]))]
+    levels = [each.amplitude for each in data]
+    return [each for each in moved if each.is_stable(levels)]
 
 
 def _measure(system: SharedSystem, data: Sequence[ResponseAtAmplitude]) -> float:

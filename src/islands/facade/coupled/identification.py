@@ -1,16 +1,17 @@
 """Searches of several outputs: one equation per output, chosen and refined for a common free run.
 
-Latent models of several outputs read the inputs only, so that each is searched on its own. A search of the
-states that all outputs share comes before.
+Latent models of several outputs read the inputs only, so that each is searched on its own. Models that all
+outputs have in common are compared with them; see `joint_models`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 from typing import Any, TypeAlias
 
 from islands.errors import SettingsError
+from islands.estimation.latent_models import MODAL_ORDERS
 from islands.estimation.refinement import refine
 from islands.evolution.presets import AUTO as AUTO_PRESET
 from islands.evolution.presets import (
@@ -24,13 +25,15 @@ from islands.evolution.search_result import require_one_output, without_optional
 from islands.evolution.search_state import SearchState, keep_hall, stop_reason
 from islands.evolution.settings import LATENT, NARX, Settings
 from islands.facade.coupled.bands import make_bands
-from islands.facade.coupled.joined_results import join_latent_results, join_results
-from islands.facade.coupled.selection import choose_equations, measure_error
-from islands.facade.coupled.shared_states import (
-    measure_results,
-    search_large_system,
-    search_shared_states,
+from islands.facade.coupled.joined_results import couple_latent_results
+from islands.facade.coupled.joint_models import (
+    JointCandidate,
+    choose_candidate,
+    exceeds_separate_searches,
+    join_candidate,
+    list_joint_candidates,
 )
+from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.evolution_run import SearchCallback
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
@@ -44,6 +47,7 @@ from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.coupled_assessment import CoupledAssessment
+from islands.validation.recommendation import measure_size
 
 #: Largest number of accepted steps of the common refinement over each interval.
 _STEPS = 20
@@ -86,7 +90,8 @@ def fit_outputs(
     common free run on the validation data. Then all parameters are refined on the common free run of the
     estimation data; the refined parameters are kept if the error on the validation data is smaller.
 
-    With ``model="latent"``, every output has a latent model of the inputs alone; see `join_latent_results`.
+    With ``model="latent"``, every output has a latent model of the inputs alone; see `couple_latent_results`.
+    Unless a library is named, models that all outputs have in common compete; see `joint_models`.
 
     Parameters
     ----------
@@ -117,16 +122,14 @@ def fit_outputs(
     )
     if chosen.get("delays"):
         raise SettingsError("delays are for one output: leave them out")
+    search = _Search(data, {"method": "fit"}, seed, steps, find)
     if chosen.get("model", NARX) == LATENT:
-        return _couple_latent(data, {"method": "fit"}, chosen, seed, steps, find)
-    if "library" not in chosen and (
-        large := search_large_system(data, {"method": "fit"}, chosen, seed, steps)
-    ):
-        return join_latent_results(data, large, seed, steps)
+        return search.couple_latent(chosen)
+    is_open = "library" not in chosen
     chosen = {"library": "polynomial", "feedthrough": "no", **chosen}
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
-    return _couple(data, chosen, trial, trial.lags + 3, refine_together, seed, steps, find)
+    return search.couple_equations(chosen, trial, trial.lags, refine_together, is_open)
 
 
 def identify_outputs(
@@ -168,14 +171,13 @@ def identify_outputs(
     settings = resolve_coupled_settings(preset, chosen)
     name = COUPLED_PRESET if preset == AUTO_PRESET else preset
     searches = _Searches(partial(find, preset=name), start, on_epoch)
-    described = {"method": "identify", "preset": preset}
+    search = _Search(data, {"method": "identify", "preset": preset}, seed, steps, searches)
     if settings.model_class == LATENT:
-        return _couple_latent(data, described, chosen, seed, steps, searches)
-    if preset == AUTO_PRESET and (large := search_large_system(data, described, chosen, seed, steps)):
-        return join_latent_results(data, large, seed, steps)
+        return search.couple_latent(chosen)
     chosen.setdefault("average", settings.average)
     trial = make_trial_library(settings)
-    return _couple(data, chosen, trial, settings.maximum_lag + 3, refine_together, seed, steps, searches)
+    is_open = preset == AUTO_PRESET
+    return search.couple_equations(chosen, trial, settings.maximum_lag, refine_together, is_open)
 
 
 class _Searches:
@@ -250,47 +252,87 @@ def _take_equations(result: Result) -> Result:
     return Result.from_search(replace(found, models=models))
 
 
-def _couple_latent(
-    data: CoupledSplit,
-    described: Mapping[str, Any],
-    options: dict[str, Any],
-    seed: int,
-    steps: Steps,
-    find: FindOutput,
-) -> Result:
-    """Search latent models, of all outputs together and of each; return those of the smaller error."""
-    if large := search_large_system(data, described, options, seed, steps):
-        return join_latent_results(data, large, seed, steps)
-    shared = search_shared_states(data, described, options, seed, steps)
-    splits = [Split(*pair) for pair in zip(data.estimation.records, data.validation.records, strict=True)]
-    results = _search_outputs(data.estimation.output_names, splits, options, steps, find)
-    if shared and measure_results(shared) <= measure_results(results):
-        results = shared
-    return join_latent_results(data, results, seed, steps)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """Candidates of several outputs, and the result of the best one.
+
+    Attributes
+    ----------
+    data : CoupledSplit
+    described : mapping
+        Settings of a result without separate searches.
+    seed : int
+    steps : Steps
+    find : callable
+        Search of one output.
+    """
+
+    data: CoupledSplit
+    described: Mapping[str, Any]
+    seed: int
+    steps: Steps
+    find: FindOutput
+
+    def couple_latent(self, options: dict[str, Any]) -> Result:
+        """Search latent models, of all outputs together and, unless they cannot win, of each."""
+        data, steps = self.data, self.steps
+        joint = list_joint_candidates(data, 1, options, self.seed, steps)
+        if exceeds_separate_searches(joint, data, MODAL_ORDERS[-1], None, steps):
+            return self._choose(joint)
+        splits = [Split(*pair) for pair in zip(data.estimation.records, data.validation.records, strict=True)]
+        results = _search_outputs(data.estimation.output_names, splits, options, steps, self.find)
+        return self._choose([*joint, couple_latent_results(data, results)])
+
+    def couple_equations(
+        self, options: dict[str, Any], trial: TrialLibrary, lags: int, refine_together: bool, is_open: bool
+    ) -> Result:
+        """Search one equation for each output, unless they cannot win, choose and refine them.
+
+        Parameters
+        ----------
+        options : dict
+            Settings of the searches.
+        trial : TrialLibrary
+            Library of models that compare sampling rates.
+        lags : int
+            Largest lag of an equation.
+        refine_together : bool
+        is_open : bool
+            Whether a model without equations may be the result.
+        """
+        data, steps, outputs = self.data, self.steps, len(self.data.estimation.records)
+
+        def list_joint(given: CoupledSplit, count: int) -> list[JointCandidate]:
+            return list_joint_candidates(given, count, options, self.seed, steps) if is_open else []
+
+        joint = list_joint(data, 1)
+        if exceeds_separate_searches(joint, data, lags * outputs, trial, steps):
+            return self._choose(joint)
+        splits = [Split(data.estimation.separate(at), data.validation.separate(at)) for at in range(outputs)]
+        steps("sampling rate", 0.0)
+        # The equations have one sampling time: the shortest that one of them needs.
+        average, least = options.get("average", AUTO), lags + 3
+        count = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
+        if count > 1:
+            data = data.map(partial(average_samples, count=count))
+            joint = list_joint(data, count)
+        options = {**options, "average": count}
+        found = _search_outputs(data.estimation.output_names, splits, options, steps, self.find)
+        results = [_take_equations(each) for each in found]
+        equations, terms = _couple_results(data, results, refine_together, self.seed, steps)
+        return self._choose([*joint, equations], terms)
+
+    def _choose(self, candidates: Sequence[JointCandidate], terms: int = 1) -> Result:
+        best, reason = choose_candidate(candidates, terms)
+        separate = next((each.outputs for each in candidates if each.outputs), ())
+        return join_candidate(self.data, best, reason, separate, self.described, self.seed, self.steps)
 
 
-def _couple(
-    data: CoupledSplit,
-    options: dict[str, Any],
-    trial: TrialLibrary,
-    least: int,
-    refine_together: bool,
-    seed: int,
-    steps: Steps,
-    find: FindOutput,
-) -> Result:
-    """Search every output, choose the equations and refine them."""
-    names = data.estimation.output_names
-    splits = [
-        Split(data.estimation.separate(place), data.validation.separate(place)) for place in range(len(names))
-    ]
-    steps("sampling rate", 0.0)
-    # The equations have one sampling time: the shortest that one of them needs.
-    average = options.get("average", AUTO)
-    options["average"] = min(select_rate(split, average, trial, least, steps)[1] for split in splits)
-    results = [_take_equations(each) for each in _search_outputs(names, splits, options, steps, find)]
+def _couple_results(
+    data: CoupledSplit, results: Sequence[Result], refine_together: bool, seed: int, steps: Steps
+) -> tuple[JointCandidate, int]:
+    """Choose one equation of each output and refine them; return also the number of all terms."""
     steps.report("choice of the equations", 0.0)
-    record, data = data.record, data.map(partial(average_samples, count=options["average"]))
     warm_up = max(entry.warm_up for result in results for entry in result.models)
     searches = [require_one_output(result.search_result) for result in results]
     ranked = [[require_narx(entry.final_model) for entry in search.models] for search in searches]
@@ -298,16 +340,27 @@ def _couple(
     choice = choose_equations(ranked, best, data.validation, warm_up, partial(steps.skip, _CHOICE))
     model = CoupledModel(tuple(models[rank - 1] for models, rank in zip(ranked, choice.ranks, strict=True)))
     refined = None
-    constraints = str(results[0].search_result.settings["constraints"])
+    constraints = str(searches[0].settings["constraints"])
     if refine_together and choice.error < inf:
         steps.report(_REFINEMENT, 0.0)
         skip = partial(steps.skip, _REFINEMENT)
-        shooting = results[0].search_result.shooting_interval
+        shooting = searches[0].shooting_interval
         refine_all = partial(_refine, model, data, shooting, warm_up, constraints, choice.error, skip)
         refined = steps.attempt(_REFINEMENT, refine_all)
-    bands = make_bands(refined or model, ranked, choice.ranks, data, constraints, warm_up, seed, steps)
-    assessed = CoupledAssessment(refined or model, data, warm_up, refined is not None, choice.ranks, bands)
-    return join_results(record, results, assessed, seed, steps)
+    final = refined or model
+    terms = {
+        (place, name)
+        for place, models in enumerate(ranked)
+        for each in models
+        for name in each.parameter_names
+    }
+    return JointCandidate(
+        "one equation for each output",
+        sum(map(measure_size, final.models)),
+        CoupledAssessment(final, data, warm_up, refined is not None, choice.ranks),
+        partial(make_bands, final, ranked, choice.ranks, data, constraints, warm_up, seed, steps),
+        tuple(results),
+    ), len(terms)
 
 
 def _refine(

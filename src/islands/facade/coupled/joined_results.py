@@ -1,51 +1,26 @@
-"""Join of the separate searches of several outputs to one result."""
+"""Latent models of separate searches of several outputs as one model."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from islands.errors import ModelError
-from islands.evolution.search_result import CoupledSearchResult, require_one_output, sum_statistics
+from islands.evolution.search_result import require_one_output
+from islands.facade.coupled.joint_models import JointCandidate
 from islands.facade.results.identification import Result
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel
 from islands.models.latent import LatentModel
 from islands.models.protocol import DynamicModel
-from islands.progress import Steps
-from islands.records.coupled import CoupledRecord, CoupledSplit
+from islands.records.coupled import CoupledSplit
 from islands.records.input_lead import advance_all_inputs
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
 from islands.validation.prediction_bands import OutputBands, PredictionBands
+from islands.validation.recommendation import measure_size
 
 
-def join_results(
-    record: CoupledRecord, results: Sequence[Result], assessed: CoupledAssessment, seed: int, steps: Steps
-) -> Result:
-    """Return the result of a model of several outputs and of the searches of each.
-
-    Parameters
-    ----------
-    record : CoupledRecord
-        Record as passed by the caller.
-    results : sequence of Result
-        Result of every output.
-    assessed : CoupledAssessment
-    seed : int
-    steps : Steps
-        Steps that the result lacks, also those of the searches.
-    """
-    found = [require_one_output(result.search_result) for result in results]
-    statistics = sum_statistics([each.search for each in found], steps)
-    return Result.from_search(
-        CoupledSearchResult(
-            *(record, assessed.split, seed, found[0].settings, statistics, (assessed,)),
-            *(tuple(found), steps.refusal),
-        )
-    )
-
-
-def join_latent_results(data: CoupledSplit, results: Sequence[Result], seed: int, steps: Steps) -> Result:
-    """Return the result of the recommended latent model of every output.
+def couple_latent_results(data: CoupledSplit, results: Sequence[Result]) -> JointCandidate:
+    """Return the recommended latent models of all outputs as one model.
 
     The outputs do not depend on each other, so that neither a common choice nor a common refinement could
     reduce an error. The bands of an output are those of its search.
@@ -55,10 +30,7 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], seed: int
     data : CoupledSplit
     results : sequence of Result
         Result of every output, from the inputs alone.
-    seed, steps
-        As for `join_results`.
     """
-    record = data.record
     best = [require_one_output(result.search_result).recommended for result in results]
     models = [each.final_model for each in best]
     if any(each.input_names != data.estimation.input_names for each in models):
@@ -72,9 +44,14 @@ def join_latent_results(data: CoupledSplit, results: Sequence[Result], seed: int
         max(each.warm_up for each in best),
         refined=False,
         ranks=tuple(result.recommendation.rank for result in results),
-        bands=OutputBands(tuple(bands)) if len(bands) == len(best) else None,
     )
-    return join_results(record, results, assessed, seed, steps)
+    return JointCandidate(
+        "one latent model for each output",
+        sum(map(measure_size, models)),
+        assessed,
+        lambda: OutputBands(tuple(bands)) if len(bands) == len(best) else None,
+        tuple(results),
+    )
 
 
 def _name_inputs(model: AnyModel | DynamicModel, inputs: tuple[str, ...]) -> LatentModel:

@@ -154,7 +154,7 @@ def _output_document(place: int, entry: CoupledAssessment, steps: Steps) -> dict
         "name": name,
         "unit": validation.output_unit,
         "folder": list_folders(entry.model.output_names)[place],
-        "rank": entry.ranks[place],
+        "rank": entry.ranks[place] if entry.ranks else None,
         "bands": bands_document(bands),
         **({"ensemble": ensemble_document(bands.ensemble)} if own and bands else {}),
         "data": {
