@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from islands.errors import ModelError
-from islands.models.block import Block, subtract_offsets
+from islands.models.block import Block
 from islands.models.equations import signal_names
-from islands.models.linearisation import OperatingPoint, read_levels
+from islands.models.linearisation import OperatingPoint, choose_levels
 from islands.models.parametric import ParametricModel
 from islands.models.protocol import EquationText
 from islands.models.signal_statement import symbols
@@ -288,8 +288,9 @@ class LatentModel(ParametricModel):
             )
         done = self.preprocessing
         offsets = np.array(done.input_offsets if done else (0.0,) * self.inputs)
-        measured = subtract_offsets(self.block(), done)
-        levels = read_levels(measured, operating_point)
+        levels = choose_levels(
+            self.column_names, (offsets + self.operating_inputs).tolist(), operating_point
+        )
         u, x = np.array(self.operating_inputs), self.rest
         if operating_point is not None:
             u = np.array(levels) - offsets

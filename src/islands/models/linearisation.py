@@ -162,10 +162,16 @@ def _write_observer_form(
 
 def read_levels(block: Block, operating_point: OperatingPoint | None) -> list[float]:
     """Return the value of every input of a block at an operating point; see `linearise_block`."""
-    names, signals = block.columns[block.computed :], block.signals[block.computed :]
-    own = [block.levels.get(name, 0.0) for name in signals]
+    own = [block.levels.get(name, 0.0) for name in block.signals[block.computed :]]
+    return choose_levels(block.columns[block.computed :], own, operating_point)
+
+
+def choose_levels(
+    names: Sequence[str], own: Sequence[float], operating_point: OperatingPoint | None
+) -> list[float]:
+    """Return the value of every input at an operating point; those of a model by default."""
     if operating_point is None:
-        return own
+        return list(own)
     if isinstance(operating_point, Mapping):
         if unknown := operating_point.keys() - set(names):
             raise ModelError(f"the model has no input {sorted(unknown)[0]}; it has {', '.join(names)}")

@@ -8,8 +8,10 @@ from numpy.typing import ArrayLike
 
 from islands.errors import ModelError
 from islands.models.coupled_narx import AnyModel, CoupledModel, list_models
-from islands.models.linearisation import OperatingPoint, find_rest, linearise_block, read_levels
+from islands.models.latent import LatentModel
+from islands.models.linearisation import OperatingPoint, find_rest, read_levels
 from islands.models.measured_signals import measured_block
+from islands.models.parametric import ParametricModel
 from islands.models.protocol import DynamicModel, no_model_error
 from islands.models.state_space import StateSpace
 from islands.validation.ensemble import Ensemble
@@ -55,12 +57,18 @@ def linearise(
         for parameters in each.parameters.tolist():
             # The states of a member may have no rest there.
             with suppress(ModelError):
-                block = measured_block(each.model.with_parameters(parameters))
-                outputs = None if block.starts else system.operating_outputs
-                members.append(linearise_block(block, system.operating_inputs, outputs))
+                member = each.model.with_parameters(parameters)
+                outputs = None if _has_own_outputs(member) else system.operating_outputs
+                members.append(member.linearise(system.operating_inputs, outputs))
                 weights.append(each.weight / len(each.parameters))
     kept = tuple(weight / sum(weights) for weight in weights)
     return replace(system, members=tuple(members), weights=kept)
+
+
+def _has_own_outputs(model: AnyModel) -> bool:
+    """Return whether states determine the outputs of a model."""
+    (single, *_) = list_models(model)
+    return isinstance(single, LatentModel) or (isinstance(single, ParametricModel) and bool(single.states))
 
 
 def find_rest_of_data(
