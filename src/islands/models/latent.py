@@ -288,9 +288,7 @@ class LatentModel(ParametricModel):
             )
         done = self.preprocessing
         offsets = np.array(done.input_offsets if done else (0.0,) * self.inputs)
-        levels = choose_levels(
-            self.column_names, (offsets + self.operating_inputs).tolist(), operating_point
-        )
+        levels = choose_levels(self.column_names, (offsets + self.operating_inputs).tolist(), operating_point)
         u, x = np.array(self.operating_inputs), self.rest
         if operating_point is not None:
             u = np.array(levels) - offsets

@@ -13,7 +13,7 @@ import {
   makeSentences,
 } from "./models.js";
 import { makeScenarioUpload } from "./scenario_upload.js";
-import { makeExactValue, makeTermPanel } from "./term_table.js";
+import { makeExactValue, makeQuantityPanel, makeTermPanel } from "./term_table.js";
 
 /** Make the table of the errors of every output in the common free run. */
 function makeOutputTable(outputs) {
@@ -48,15 +48,19 @@ function getHalfWidth(bands) {
 }
 
 /** Make the model of several outputs: equations, errors, terms and the free run of every output. */
-function makeCoupledDetail(job, model, outputs, signal) {
+function makeCoupledDetail(job, { model, outputs, record }, signal) {
   const path = `${getJobPath(job.id)}/models/${model.rank}`;
+  // The parameters of a large state space are coordinates, and have no meaning one by one.
+  const [title, equation, content] = model.quantities
+    ? ["State space", "", makeQuantityPanel(model, record.names)]
+    : ["Equations", makeEquation(path, model, signal), makeTermPanel(model)];
   return [
-    el("h3", { id: "model" }, "Equations"),
-    makeEquation(path, model, signal),
+    el("h3", { id: "model" }, title),
+    equation,
     makeExportRow(path, model.rank),
     el("h4", {}, "Outputs"),
     makeScrollable("Errors of the outputs", makeOutputTable(outputs)),
-    makeTermPanel(model),
+    content,
     makeGallery(path, signal),
     makeLinearSystem(path, job.spec, signal),
     makeScenarioUpload(path, job.spec.output, signal),
@@ -69,8 +73,8 @@ export function makeCoupledPanel(job, signal) {
   const article = el("article", { class: "model", "aria-labelledby": "model" });
   poll(async () => {
     const path = `${getJobPath(job.id)}/result`;
-    const { models: [model], outputs } = await getJson(path, { signal });
-    article.replaceChildren(...makeCoupledDetail(job, model, outputs, signal));
+    const { models: [model], outputs, record } = await getJson(path, { signal });
+    article.replaceChildren(...makeCoupledDetail(job, { model, outputs, record }, signal));
     const note = el(
       "p",
       { class: "soft small" },

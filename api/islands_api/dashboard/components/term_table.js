@@ -36,3 +36,24 @@ export function makeTermPanel(model) {
   const name = nameSize(model.kind);
   return el("div", {}, el("h4", {}, name), makeScrollable(name, makeTermTable(model)));
 }
+
+/** Columns of quantities: heading, name of the field and digits. */
+const QUANTITY_COLUMNS = [["Value", "value", 6], ["Standard error", "standard_error", 2]];
+
+/** Make the table of the modes and gains of a linear system, whose parameters are coordinates of its states. */
+export function makeQuantityPanel({ quantities }, { inputs, outputs }) {
+  const describe = ({ name, unit, input, output }) => {
+    const where = input === null ? "" : ` of ${inputs[input - 1]} on ${outputs[output - 1]}`;
+    return `${name}${where}${unit ? ` (${unit})` : ""}`;
+  };
+  const table = makeTable(
+    "Modes and gains of the model",
+    ["Quantity", ...QUANTITY_COLUMNS.map(([heading]) => [heading, "figure"])],
+    quantities.map((each) => [
+      describe(each),
+      ...QUANTITY_COLUMNS.map(([, field, digits]) =>
+        makeExactValue(each[field], (number) => formatNumber(number, digits))),
+    ]),
+  );
+  return el("div", {}, el("h4", {}, "Modes and gains"), makeScrollable("Modes and gains", table));
+}

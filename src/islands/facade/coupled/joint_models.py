@@ -16,6 +16,9 @@ from functools import partial
 from math import isfinite, sqrt
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from islands.errors import RecordError
 from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.linear.identify import LARGEST_ORDER
@@ -44,7 +47,7 @@ from islands.records.split import Split
 from islands.report.documents.result_folder import record_document
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, EnsembleStructure, ValidatedModel, make_ensemble
-from islands.validation.prediction_bands import OutputBands, calibrate_bands, calibrate_output_bands
+from islands.validation.prediction_bands import OutputBands, calibrate_output_bands
 from islands.validation.recommendation import LARGEST_RATIO, measure_size, recommend_joint
 
 #: The linear model is estimated by the error of the free run.
@@ -150,21 +153,23 @@ def _identify_linear(data: CoupledSplit, seed: int, steps: Steps) -> list[JointC
 
     def find_bands() -> OutputBands | None:
         pairs = zip(model.models, data.estimation.records, data.validation.records, strict=True)
-        bands = [_calibrate(each, Split(*parts), seed, steps) for each, *parts in pairs]
-        known = tuple(each for each in bands if each)
-        return OutputBands(known) if len(known) == len(bands) else None
+        draws = [_draw(each, Split(*parts), seed, steps) for each, *parts in pairs]
+        count = min(map(len, draws))
+        if not count:
+            return None
+        ensemble = Ensemble((EnsembleStructure(model, 1.0, np.hstack([each[:count] for each in draws])),))
+        return calibrate_output_bands(model, ensemble, data, model.maximum_lag)
 
     words = f"a linear model of {poles} poles that the outputs share"
     return [_assess(words, size, model, data, find_bands, steps)]
 
 
-def _calibrate(model: LatentModel, split: Split, seed: int, steps: Steps) -> Any:
-    """Return the bands of one output, from a block bootstrap of its free run."""
-    warm_up = model.maximum_lag
+def _draw(model: LatentModel, split: Split, seed: int, steps: Steps) -> NDArray[np.float64]:
+    """Return parameters of the model of an output from a block bootstrap of its free run, row by row."""
     candidates = [ValidatedModel(model, _CRITERION, 1.0)]
     skip = partial(steps.skip, BANDS)
-    ensemble = make_ensemble(candidates, split, "none", warm_up, seed, skip, model)
-    return calibrate_bands([model], ensemble, split, warm_up)[0] if ensemble else None
+    ensemble = make_ensemble(candidates, split, "none", model.maximum_lag, seed, skip, model)
+    return ensemble.structures[0].parameters if ensemble else np.empty((0, model.size))
 
 
 def _assess(

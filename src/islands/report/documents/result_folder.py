@@ -23,8 +23,10 @@ from islands.evolution.search_result import (
     state_steps,
     without_optional_steps,
 )
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, coupled_signals
 from islands.models.equations import name_gains, named_signals, named_statement
+from islands.models.joint_quantities import list_joint_quantities
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.parametric import ParametricModel
@@ -49,6 +51,7 @@ from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure, missing_structure
+from islands.validation.recommendation import is_linear
 from islands.validation.residual_tests import ResidualTests
 
 SCHEMA = "islands.result/1"
@@ -190,6 +193,7 @@ def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, An
         "signals": signals,
         "named_signals": signals,
         "terms": terms_in_result(model, ensemble),
+        **_describe_modes(entry),
         "refined": entry.refined,
         "metrics": {
             part: {
@@ -199,6 +203,20 @@ def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, An
             for part in PARTS
         },
         "warm_up": entry.warm_up,
+    }
+
+
+def _describe_modes(entry: CoupledAssessment) -> dict[str, Any]:
+    """Return the modes and gains of a linear system whose parameters are coordinates of its states."""
+    model, bands = entry.model, entry.bands
+    if not isinstance(model, CoupledLatentModel) or not (model.shares_states or is_linear(model)):
+        return {}
+    ensemble = None if bands is None else bands.ensemble
+    members = [row for each in ensemble.structures for row in each.parameters.tolist()] if ensemble else []
+    return {
+        "shared_states": model.models[0].order if model.shares_states else 0,
+        "linear": is_linear(model),
+        "quantities": list_joint_quantities(model, members),
     }
 
 

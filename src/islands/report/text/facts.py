@@ -697,6 +697,24 @@ class OutputsFacts:
         """Whether every output has a latent model from a separate search."""
         return bool(self.model.get("kind") == CoupledLatentModel.kind)
 
+    @property
+    def quantities(self) -> Sequence[Document]:
+        """Modes and gains of a linear system whose parameters are coordinates of its states; may be empty."""
+        found: Sequence[Document] = self.model.get("quantities", ())
+        return found
+
+    @property
+    def reasons(self) -> Sequence[str]:
+        """Why the model is recommended; empty if it was compared with no other one."""
+        found: Sequence[str] = self.document["recommended"]["reasons"]
+        return found
+
+    @property
+    def columns(self) -> tuple[list[str], list[str]]:
+        """Names of the inputs and of the outputs."""
+        names = self.document["record"]["names"]
+        return names["inputs"], names["outputs"]
+
     @cached_property
     def extrapolation(self) -> list[str]:
         """Inputs of the validation data that leave the range of the estimation data."""

@@ -36,7 +36,7 @@ def _describe_outputs(document: Document) -> list[str]:
     return [
         *write("outputs", "essence", f=facts),
         write_one("outputs", "equations", f=facts),
-        f"    {'; '.join(facts.model['equation'].splitlines())}",
+        *([] if facts.quantities else [f"    {'; '.join(facts.model['equation'].splitlines())}"]),
         *write("outputs", "finding", f=facts),
     ]
 

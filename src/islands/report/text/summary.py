@@ -18,6 +18,7 @@ from islands.models.narx import Model
 from islands.persistence.saved_documents import find_recommended
 from islands.report.text.facts import Document, OutputFacts, OutputsFacts, ResultFacts
 from islands.report.text.layout import LEGEND, MARK, term_table, wrap
+from islands.report.text.mode_tables import GAINS, MODES, align, list_gains, list_modes
 from islands.sentences import write, write_named, write_one
 from islands.validation.assessment import PARTS
 
@@ -70,7 +71,7 @@ def _summarise_outputs(document: Document, model: CoupledModel) -> str:
         "",
         *wrap(write_one("outputs", "equations", f=facts)),
         "",
-        *(line for single in model.models for line in [*term_table(single), ""]),
+        *_list_equations(facts, model),
         *linear,
         *([""] if linear else []),
         *wrap(f"{signals}."),
@@ -82,6 +83,14 @@ def _summarise_outputs(document: Document, model: CoupledModel) -> str:
         *(line for text in write("outputs", "finding", f=facts) for line in wrap(text)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _list_equations(facts: OutputsFacts, model: CoupledModel) -> list[str]:
+    """Return the modes and gains of a model whose parameters are coordinates of its states, or its terms."""
+    if not facts.quantities:
+        return [line for single in model.models for line in [*term_table(single), ""]]
+    modes, gains = list_modes(facts.quantities), list_gains(facts.quantities, *facts.columns)
+    return [*align(MODES, modes), "", *align(GAINS, gains), ""]
 
 
 def _describe_output(output: OutputFacts) -> str:
