@@ -11,6 +11,7 @@ from islands.expressions.primitives import PRIMITIVES
 from islands.expressions.user_primitive import primitive
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
+from islands.models.latent import StateSpaceLayout
 from islands.models.measured_signals import measured_block, program_block
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
@@ -75,14 +76,57 @@ _AT_ONCE = {
 #: A second-order lag, which the first input reaches also within a sample of its dead time.
 _LATE = {"a1_1": 0.9, "a1_2": 0.1, "a2_2": 0.8, "b1_1": 0.1, "b2_2": 0.3, "c1": 1.0, "d1": 0.2, "level": 0.4}
 
-#: A state that no constant input holds, except for zero.
-_INTEGRATOR = {"a1_1": 1.0, "a1_2": 0.1, "a2_2": 0.8, "b2": 0.1, "c1": 1.0}
-
 
 def with_offsets(of, output, inputs):
     """Return a model of deviations from the given output and inputs."""
     steps = PreprocessingSteps(detrend="constant")
     return replace(of, preprocessing=Preprocessing(steps, of.dt, inputs, output, 0.0))
+
+
+def make_shared_states():
+    """Return a model of two outputs of the same states, in deviations.
+
+    The states are a resonance, and the mean magnitude of both inputs, which changes the gain by a difference
+    of squares.
+    """
+    layout = StateSpaceLayout(3, 2, 4)
+    theta = np.zeros(len(layout.names))
+    blocks = layout.split(theta)
+    blocks["A"][:] = [[0.7, 0.4, 0.0], [-0.4, 0.7, 0.0], [0.0, 0.0, 0.9]]
+    blocks["B"][:2] = [[0.3, 0.0], [0.2, 0.1]]
+    blocks["E"][[0, 0, 2, 2], [2, 3, 0, 1]] = 0.02, -0.02, 0.05, 0.05
+    blocks["W"][[0, 1, 2, 2, 3, 3], [3, 4, 0, 2, 0, 2]] = 1.0, 1.0, 0.5, 1.0, 0.5, -1.0
+    blocks["o"][2] = -0.02
+    models = []
+    for name, c, level in (("a_m", (1.0, 0.3), 0.2), ("b_m", (-0.5, 0.8), -0.1)):
+        blocks["C"][:2], blocks["level"][0] = c, level
+        named = {key: value for key, value in zip(layout.names, theta.tolist(), strict=True) if value}
+        fields = {"input_names": ("p_V", "q_V"), "output_name": name, "operating_inputs": (0.1, -0.2)}
+        units = ("abs", "abs", "square", "square")
+        models.append(make_model(named, units, 3, memory=12, **fields))
+    return CoupledLatentModel(tuple(map(with_offsets, models, (3.7, -1.2), ((20.0, 5.0),) * 2)))
+
+
+def make_shared_poles():
+    """Return a model of two outputs with the same poles and other dead times."""
+    return CoupledLatentModel(
+        tuple(
+            make_model(
+                {**_LATE, "c1": c1},
+                (),
+                input_names=("p_V", "q_V"),
+                output_name=name,
+                operating_inputs=(0.2, 0.5),
+                delays=delays,
+                memory=20,
+            )
+            for name, c1, delays in (("a_m", 1.0, (3, 1)), ("b_m", -0.4, (1, 5)))
+        )
+    )
+
+
+#: A state that no constant input holds, except for zero.
+_INTEGRATOR = {"a1_1": 1.0, "a1_2": 0.1, "a2_2": 0.8, "b2": 0.1, "c1": 1.0}
 
 
 #: Models of every class, and with every property on which programs depend.
@@ -121,6 +165,8 @@ OF_BLOCKS = {
     "state spaces of deviations": CoupledLatentModel(
         tuple(with_offsets(each, 3.7, (20.0,)) for each in make_coupled_latent_model().models)
     ),
+    "shared states": make_shared_states(),
+    "shared poles with dead times": make_shared_poles(),
 }
 
 
