@@ -11,7 +11,6 @@ from math import inf
 from typing import Any, TypeAlias
 
 from islands.errors import SettingsError
-from islands.estimation.latent_models import MODAL_ORDERS
 from islands.estimation.refinement import refine
 from islands.evolution.presets import AUTO as AUTO_PRESET
 from islands.evolution.presets import (
@@ -29,12 +28,14 @@ from islands.facade.coupled.joined_results import couple_latent_results
 from islands.facade.coupled.joint_models import (
     JointCandidate,
     choose_candidate,
-    exceeds_separate_searches,
+    exceeds_equations,
+    exceeds_latent_models,
     join_candidate,
     list_joint_candidates,
 )
 from islands.facade.coupled.selection import choose_equations, measure_error
 from islands.facade.evolution_run import SearchCallback
+from islands.facade.fit_settings import FitSettings
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
@@ -129,7 +130,8 @@ def fit_outputs(
     chosen = {"library": "polynomial", "feedthrough": "no", **chosen}
     degree, lags, constraints = (chosen.get(name) for name in ("degree", "lags", "constraints"))
     trial = take_library(chosen["library"], degree, lags, constraints)
-    return search.couple_equations(chosen, trial, trial.lags, refine_together, is_open)
+    most_terms = int(chosen.get("max_terms", FitSettings().max_terms))
+    return search.couple_equations(chosen, trial, trial.lags, most_terms, refine_together, is_open)
 
 
 def identify_outputs(
@@ -176,8 +178,8 @@ def identify_outputs(
         return search.couple_latent(chosen)
     chosen.setdefault("average", settings.average)
     trial = make_trial_library(settings)
-    is_open = preset == AUTO_PRESET
-    return search.couple_equations(chosen, trial, settings.maximum_lag, refine_together, is_open)
+    is_open, lags = preset == AUTO_PRESET, settings.maximum_lag
+    return search.couple_equations(chosen, trial, lags, settings.max_terms, refine_together, is_open)
 
 
 class _Searches:
@@ -277,14 +279,20 @@ class _Search:
         """Search latent models, of all outputs together and, unless they cannot win, of each."""
         data, steps = self.data, self.steps
         joint = list_joint_candidates(data, 1, options, self.seed, steps)
-        if exceeds_separate_searches(joint, data, MODAL_ORDERS[-1], None, steps):
+        if exceeds_latent_models(joint):
             return self._choose(joint)
         splits = [Split(*pair) for pair in zip(data.estimation.records, data.validation.records, strict=True)]
         results = _search_outputs(data.estimation.output_names, splits, options, steps, self.find)
         return self._choose([*joint, couple_latent_results(data, results)])
 
     def couple_equations(
-        self, options: dict[str, Any], trial: TrialLibrary, lags: int, refine_together: bool, is_open: bool
+        self,
+        options: dict[str, Any],
+        trial: TrialLibrary,
+        lags: int,
+        most_terms: int,
+        refine_together: bool,
+        is_open: bool,
     ) -> Result:
         """Search one equation for each output, unless they cannot win, choose and refine them.
 
@@ -296,6 +304,8 @@ class _Search:
             Library of models that compare sampling rates.
         lags : int
             Largest lag of an equation.
+        most_terms : int
+            Largest number of terms of an equation.
         refine_together : bool
         is_open : bool
             Whether a model without equations may be the result.
@@ -306,7 +316,7 @@ class _Search:
             return list_joint_candidates(given, count, options, self.seed, steps) if is_open else []
 
         joint = list_joint(data, 1)
-        if exceeds_separate_searches(joint, data, lags * outputs, trial, steps):
+        if exceeds_equations(joint, data, most_terms * outputs, trial, steps):
             return self._choose(joint)
         splits = [Split(data.estimation.separate(at), data.validation.separate(at)) for at in range(outputs)]
         steps("sampling rate", 0.0)

@@ -6,8 +6,8 @@ The candidates are compared on the common free run, as linear and nonlinear mode
 * a state space whose states all outputs share, linear and with an effect of the amplitude;
 * one equation, or one latent model, for each output.
 
-The separate searches are not made if they cannot win: if the state space has more states than they can find,
-and a trial of their equations on measured outputs has more than twice its error.
+The separate searches are not made if they cannot win: if the state space has more parameters than their
+equations may have terms, and a trial of an equation on measured outputs has more than twice its error.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.estimation.estimator_table import refinement_criterion
+from islands.estimation.latent_models import MODAL_ORDERS
 from islands.estimation.linear.identify import LARGEST_ORDER
 from islands.estimation.linear.latent import identify_joint_model
 from islands.estimation.shared_states import SharedModel, search_shared_models
@@ -184,36 +185,40 @@ def _assess(
     return JointCandidate(words, size, assessed, lambda: steps.attempt(BANDS, find_bands))
 
 
-def exceeds_separate_searches(
-    found: Sequence[JointCandidate], data: CoupledSplit, states: int, trial: TrialLibrary | None, steps: Steps
+def exceeds_latent_models(found: Sequence[JointCandidate]) -> bool:
+    """Return whether the best model has more states than the search of a latent model of one output."""
+    return bool(found) and choose_candidate(found, 1)[0].order > MODAL_ORDERS[-1]
+
+
+def exceeds_equations(
+    found: Sequence[JointCandidate], data: CoupledSplit, terms: int, trial: TrialLibrary, steps: Steps
 ) -> bool:
-    """Return whether separate searches of the outputs cannot win against a model of all of them.
+    """Return whether one equation for each output cannot win against the best model of all of them.
+
+    It has more parameters than the equations may have terms, and a trial of the equations on measured values
+    of the other outputs has more than twice the error: nonlinear terms do not replace states.
 
     Parameters
     ----------
     found : sequence of JointCandidate
     data : CoupledSplit
-    states : int
-        Number of states that the models of the separate searches may have.
-    trial : TrialLibrary or None
-        Library of their equations, whose nonlinear terms may replace states: the search is left out only if
-        a trial on measured values of the other outputs has more than twice the error. None of latent models.
+    terms : int
+        Largest number of terms of all equations.
+    trial : TrialLibrary
+        Library of the equations.
     steps : Steps
     """
-    if not found:
-        return False
-    best, _ = choose_candidate(found, 1)
-    if best.order <= states:
+    best = choose_candidate(found, 1)[0] if found else None
+    if best is None or best.size <= terms:
         return False
     limit, total = LARGEST_RATIO * best.assessed.validation_error, 0.0
-    for place, each in enumerate(data.estimation.records if trial else ()):
-        assert trial is not None
+    for place, each in enumerate(data.estimation.records):
         steps.report(f"trial of an equation of {each.output_name}", None)
         error = min(measure_library(hold_out(data.estimation.separate(place)), trial, steps))
         total += (error / (each.output_range or 1.0)) ** 2 / len(data.estimation.records)
         if sqrt(total) > limit:
             return True
-    return trial is None
+    return False
 
 
 def choose_candidate(candidates: Sequence[JointCandidate], terms: int) -> tuple[JointCandidate, str]:

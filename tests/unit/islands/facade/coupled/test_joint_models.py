@@ -6,7 +6,8 @@ import pytest
 import islands
 from islands.facade.coupled.joint_models import (
     choose_candidate,
-    exceeds_separate_searches,
+    exceeds_equations,
+    exceeds_latent_models,
     join_candidate,
     list_joint_candidates,
 )
@@ -78,14 +79,14 @@ def test_a_search_is_left_out_only_if_neither_its_states_nor_its_terms_suffice()
     data = split_coupled(make_record(1, (1.0,), 0.0), 0.3)
     candidates = list_joint_candidates(data, 1, {}, 0, Steps())
     one = take_library("polynomial", 1, 1, None)
-    assert exceeds_separate_searches(candidates, data, 2, one, Steps())
-    assert not exceeds_separate_searches(candidates, data, 4, one, Steps())
-    assert exceeds_separate_searches(candidates, data, 2, None, Steps())
+    assert exceeds_equations(candidates, data, 6, one, Steps())
+    assert not exceeds_equations(candidates, data, 60, one, Steps())
+    assert not exceeds_latent_models(candidates)
     # A product of two measured outputs replaces states of any number.
     data = split_coupled(make_coupled_record(PREY, samples=400), 0.25)
     candidates = list_joint_candidates(data, 1, {}, 0, Steps())
     product = take_library("polynomial", 2, 2, None)
-    assert not exceeds_separate_searches(candidates, data, 1, product, Steps())
+    assert not exceeds_equations(candidates, data, 1, product, Steps())
 
 
 def test_models_of_all_outputs_meet_no_constraints(data):
