@@ -213,11 +213,11 @@ class SimulationRequest(BaseModel):
     samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] | None = Field(
         default=None, description="Number of samples; by default that of the given numbers, or 2000."
     )
-    initial_output: FiniteFloat | None = Field(
+    initial_output: FiniteFloat | Annotated[dict[Name, FiniteFloat], Field(max_length=16)] | None = Field(
         default=None,
-        description="Output before the first sample. By default the model rests in its stable equilibrium at "
-        "the first values of the inputs; a model without a unique one starts from the first measured output "
-        "of the record.",
+        description="Output before the first sample, of several outputs by column. By default the model "
+        "rests in its stable equilibrium at the first values of the inputs; a model without a unique one "
+        "starts from the first measured output of the record.",
     )
 
 
@@ -227,17 +227,17 @@ class SimulatedOutput(ResponseModel):
     dt: float = Field(description="Sampling time of the model in seconds.")
     time_s: tuple[float, ...]
     inputs: dict[str, tuple[float, ...]]
-    output: tuple[float | None, ...] = Field(description="Null from a divergence on.")
-    initial_output: float = Field(description="Output before the first sample.")
-    start: str = Field(description="Where the initial output is from, in a sentence.")
-    outcome: str = Field(description="`ok`, or where the output diverged.")
+    outputs: dict[str, tuple[float | None, ...]] = Field(description="By column. Null from a divergence on.")
+    initial_outputs: dict[str, float] = Field(description="Outputs before the first sample, by column.")
+    start: str = Field(description="Where the initial outputs are from, in a sentence.")
+    outcome: str = Field(description="`ok`, or where an output diverged.")
     warnings: tuple[str, ...] = Field(
         description="Inputs that leave the range of the estimation data, divergence, missing samples."
     )
     ranges: dict[str, tuple[float, float]] = Field(
         description="Least and largest value of every input in the estimation data, if the result has them."
     )
-    units: dict[str, str] = Field(description="Units of the inputs and of the output, by column.")
+    units: dict[str, str] = Field(description="Units of the inputs and of the outputs, by column.")
 
 
 class ScenarioRequest(BaseModel):

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 
 import islands
-from islands.persistence.models import model_from_json
+from islands.persistence.models import any_model_from_json, model_from_json
 from islands.systems import signals
 from islands_api.client import Client
-from islands_service.coordinator.identification_job import run_identification_job
-from islands_service.store.blobs import Blobs
-from support.coupled_systems import TWO_MASSES, make_coupled_record
-from support.job_runs import make_run
-from support.service import problem_of, run_identification
-from support.stores import taken
+from support.service import problem_of
 
 pytestmark = pytest.mark.ci
 
@@ -39,24 +34,13 @@ EXCITATIONS = {
 
 
 @pytest.fixture(scope="module")
-def service(serve):
-    with serve() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def job(service):
-    return run_identification(service)
-
-
-@pytest.fixture(scope="module")
-def model(service, job):
-    with Client(service.url) as client:
+def model(identified, job):
+    with Client(identified.url) as client:
         return model_from_json(client.export(job, 1, "json"))
 
 
-def ask(service, job, body, rank=1):
-    return service.client.post(f"/v1/jobs/{job}/models/{rank}/simulate", json=body)
+def ask(identified, job, body, rank=1):
+    return identified.client.post(f"/v1/jobs/{job}/models/{rank}/simulate", json=body)
 
 
 def simulate(model, u, rest):
@@ -69,16 +53,18 @@ def simulate(model, u, rest):
 
 
 @pytest.mark.parametrize("kind", EXCITATIONS)
-def test_the_response_is_that_of_the_library_bit_for_bit(service, job, model, kind):
+def test_the_response_is_that_of_the_library_bit_for_bit(identified, job, model, kind):
     given, u = EXCITATIONS[kind]
-    found = ask(service, job, {"inputs": {"u_V": given}, "samples": 500}).json()
+    found = ask(identified, job, {"inputs": {"u_V": given}, "samples": 500}).json()
     assert found["inputs"]["u_V"] == u.tolist()
     assert found["dt"] == DT
     assert found["time_s"] == (DT * np.arange(500)).tolist()
-    assert found["initial_output"] == islands.FittedModel.from_model(model).static_characteristic(u[0])[0]
-    assert found["output"] == simulate(model, u, found["initial_output"]).tolist()
+    assert found["initial_outputs"] == {
+        "y_um": islands.FittedModel.from_model(model).static_characteristic(u[0])[0]
+    }
+    assert found["outputs"] == {"y_um": simulate(model, u, found["initial_outputs"]["y_um"]).tolist()}
     assert found["outcome"] == "ok"
-    again = ask(service, job, {"inputs": {"u_V": given}, "samples": 500})
+    again = ask(identified, job, {"inputs": {"u_V": given}, "samples": 500})
     assert again.json() == found
 
 
@@ -107,21 +93,23 @@ def test_the_response_is_that_of_the_library_bit_for_bit(service, job, model, ki
         ),
     ],
 )
-def test_requests_are_bounded(service, job, body, status, kind, detail):
-    assert detail in problem_of(ask(service, job, body), status, kind)
+def test_requests_are_bounded(identified, job, body, status, kind, detail):
+    assert detail in problem_of(ask(identified, job, body), status, kind)
 
 
-def test_a_model_of_several_outputs_is_refused_with_advice(service, tmp_path):
-    record = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
-    table = [0.1 * np.arange(200).round(3), record.records[0].u[:, 0], *record.y.T]
-    path = tmp_path / "masses.csv"
-    np.savetxt(path, np.transpose(table), delimiter=",", header="t_s,u,y1,y2", comments="", fmt="%.17g")
-    settings = {"population": 8, "generations": 2, "max_terms": 4, "library_degree": 1, "islands": 1}
-    with Client(service.url) as client:
-        job = client.submit(client.upload(path), "u", ["y1", "y2"], average=1, **settings)
-        lease = taken(service.store, job.id)
-        outcome = run_identification_job(make_run(lease, service.store, Blobs(service.settings.blobs)))
-        service.store.leases.finish(lease, outcome)
-    detail = problem_of(ask(service, job.id, {}), 404, "not-found")
-    assert "has the outputs y1, y2" in detail
-    assert "islands simulate" in detail
+def test_a_model_of_several_outputs_returns_every_output(identified, outputs):
+    (stored,) = identified.store.results.models(outputs, 1)
+    model = islands.FittedModel.from_model(any_model_from_json(stored.file, "model"))
+    u = np.sin(0.2 * np.arange(80.0))
+    found = ask(identified, outputs, {"inputs": {"u": u.tolist()}}).json()
+    assert found["outputs"] == dict(zip(("y1", "y2"), model.simulate(u).y.T.tolist(), strict=True))
+    assert found["start"].startswith("before the first sample y1 is ")
+    assert " and y2 is " in found["start"]
+    given = {"y1": 0.5, "y2": -0.25}
+    found = ask(identified, outputs, {"inputs": {"u": u.tolist()}, "initial_output": given}).json()
+    assert found["initial_outputs"] == given
+    assert found["outputs"]["y2"] == model.simulate(u, y=[0.5, -0.25]).y[:, 1].tolist()
+    recorded = ask(identified, outputs, {"inputs": {"u": {"kind": "record"}}, "samples": 50}).json()
+    assert {len(each) for each in recorded["outputs"].values()} == {50}
+    one = ask(identified, outputs, {"initial_output": 1.0})
+    assert "initial_output of each by name" in problem_of(one, 422, "invalid-settings")

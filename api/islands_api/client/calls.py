@@ -451,7 +451,7 @@ def simulate(
     inputs: Mapping[str, Sequence[float] | Mapping[str, Any]] | None = None,
     *,
     samples: int | None = None,
-    initial_output: float | None = None,
+    initial_output: float | Mapping[str, float] | None = None,
 ) -> RequestSpec[SimulatedOutput]:
     """Simulate a model of a job with inputs of choice.
 
@@ -467,9 +467,9 @@ def simulate(
         ``{"kind": "record", "scale": 1.2, "offset": 0}``. Other inputs are held in the middle of their range.
     samples : int, optional
         Number of samples, at most 50 000; by default that of the given samples, or 2000.
-    initial_output : float, optional
-        Output before the first sample; by default the stable equilibrium at the first values of the inputs,
-        or the first measured output if there is no unique one.
+    initial_output : float or mapping, optional
+        Output before the first sample, of several outputs by column; by default the stable equilibrium at the
+        first values of the inputs, or the first measured output if there is no unique one.
     """
     given: dict[str, Any] = {
         "inputs": {

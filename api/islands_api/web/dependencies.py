@@ -12,7 +12,7 @@ import numpy as np
 from fastapi import Depends, Request
 from numpy.typing import NDArray
 
-from islands.records.dataset import Dataset
+from islands.records.coupled import AnyRecord
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.limits import BlockingExecutor, OwnerCounts, OwnerSlots, RateLimiter, UploadAdmission
 from islands_api.web.model_simulation import SimulatedModel
@@ -131,7 +131,7 @@ class AppState:
     simulated_models: RecentValues[ModelKey, SimulatedModel] = field(
         default_factory=lambda: RecentValues(MAX_KEPT_MODELS)
     )
-    simulated_records: RecentValues[ModelKey, Dataset] = field(
+    simulated_records: RecentValues[ModelKey, AnyRecord] = field(
         default_factory=lambda: RecentValues(MAX_KEPT_RECORDS)
     )
     linear_figures: RecentValues[LinearKey, Mapping[str, str]] = field(

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from pydantic_core import to_json
 
 from islands.errors import ModelError, SettingsError, suggest
-from islands.models.coupled_narx import CoupledModel
+from islands.models.coupled_narx import AnyModel, list_models
 from islands.models.operating_point import find_equilibrium
-from islands.models.protocol import DynamicModel
 from islands.persistence.models import any_model_from_json
-from islands.records.dataset import Dataset
+from islands.records.coupled import AnyRecord
 from islands.records.split import compare_input_ranges
 from islands.systems import signals
 from islands_api.simulation_schemas import (
@@ -30,7 +29,6 @@ from islands_api.simulation_schemas import (
     Sweep,
     Wave,
 )
-from islands_api.web.problems import ResourceNotFoundError
 from islands_service.store.results import StoredModel
 
 #: Samples of a response whose length is not given.
@@ -55,16 +53,16 @@ class SimulatedModel:
 
     Attributes
     ----------
-    model : DynamicModel
+    model : DynamicModel or CoupledModel
     units : tuple of str
-        Of the inputs, then of the output.
+        Of the inputs, then of the outputs.
     ranges : tuple of (float, float)
         Range of every input in the estimation data, as measured.
     output_range : float
-        Range of the output in the record.
+        Range of the output in the record; the largest one of several.
     """
 
-    model: DynamicModel
+    model: AnyModel
     units: tuple[str, ...]
     ranges: tuple[tuple[float, float], ...]
     output_range: float
@@ -72,7 +70,12 @@ class SimulatedModel:
     @property
     def rows(self) -> int:
         """Number of samples of the record that the longest response reads, at most some megabytes."""
-        return min(MAX_SAMPLES * self.model.average, _MOST_VALUES // (1 + self.model.inputs))
+        return min(MAX_SAMPLES * self.model.average, _MOST_VALUES // len(self.units))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(each.output_name for each in list_models(self.model))
 
     @property
     def dt(self) -> float:
@@ -80,32 +83,26 @@ class SimulatedModel:
         return 1.0 if self.model.dt is None else self.model.dt
 
 
-def read_simulated_model(job: str, stored: StoredModel, document: Mapping[str, Any]) -> SimulatedModel:
+def read_simulated_model(stored: StoredModel, document: Mapping[str, Any]) -> SimulatedModel:
     """Read a model of a job, whose result is ``document``.
 
     Raises
     ------
-    ResourceNotFoundError
-        The model has several outputs.
     ModelError
         The model is damaged.
     """
     model = any_model_from_json(stored.file, f"model {stored.rank}")
-    if isinstance(model, CoupledModel):
-        raise ResourceNotFoundError(
-            f"the model of job {job} has the outputs {', '.join(model.output_names)}, and only models of one "
-            "output are simulated here: save the model in the format json, and run 'islands simulate MODEL "
-            "RECORD' with a record of the inputs and the first values of the outputs"
-        )
     units, data = document["record"]["units"], document.get("data", {})
-    shifts = model.preprocessing.input_offsets if model.preprocessing else (0.0,) * model.inputs
+    done = model.preprocessing
+    shifts = done.input_offsets if done else (0.0,) * len(model.column_names)
     ranges = tuple(
         (low + shift, high + shift)
         for (low, high), shift in zip(data.get("inputs", {}).get("estimation", ()), shifts, strict=False)
     )
-    return SimulatedModel(
-        model, (*units["inputs"], units["output"]), ranges, float(data.get("output_range") or 0.0)
-    )
+    facts = [each["data"] for each in document["outputs"]] if "outputs" in document else [data]
+    output_range = max(float(each.get("output_range") or 0.0) for each in facts)
+    of_outputs = units["outputs"] if "outputs" in units else [units["output"]]
+    return SimulatedModel(model, (*units["inputs"], *of_outputs), ranges, output_range)
 
 
 def reads_record(request: SimulationRequest) -> bool:
@@ -114,13 +111,13 @@ def reads_record(request: SimulationRequest) -> bool:
 
 
 def make_inputs(
-    found: SimulatedModel, request: SimulationRequest, recorded: Dataset | None
+    found: SimulatedModel, request: SimulationRequest, recorded: AnyRecord | None
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Return the inputs of a request, and a warning if there are fewer samples than asked for.
 
     Parameters
     ----------
-    recorded : Dataset, optional
+    recorded : Dataset or CoupledRecord, optional
         Beginning of the record at the rate of the model, if an input is that of the record.
 
     Returns
@@ -148,7 +145,7 @@ def make_inputs(
     return np.column_stack(columns), warnings
 
 
-def _count_samples(request: SimulationRequest, recorded: Dataset | None) -> tuple[int, list[str]]:
+def _count_samples(request: SimulationRequest, recorded: AnyRecord | None) -> tuple[int, list[str]]:
     lengths = {name: len(each) for name, each in request.inputs.items() if isinstance(each, list)}
     samples = request.samples or next(iter(lengths.values()), _SAMPLES)
     for name, length in lengths.items():
@@ -167,7 +164,7 @@ def _make_input(
     request: SimulationRequest,
     place: int,
     samples: int,
-    recorded: Dataset | None,
+    recorded: AnyRecord | None,
 ) -> NDArray[np.float64]:
     name = found.model.column_names[place]
     given = request.inputs.get(name)
@@ -209,32 +206,45 @@ class Start(NamedTuple):
 
     Attributes
     ----------
-    output : float or None
-        Output before the first sample; None if the first measured one is taken, since there is no other.
+    outputs : tuple of float or None
+        Outputs before the first sample; None if the first measured ones are taken, since there are no others.
     is_rest : bool
         Whether the model rests there, with all of its states.
     reason : str
-        Reason of the value, the end of a sentence.
+        Reason of the values, the end of a sentence.
     """
 
-    output: float | None
+    outputs: tuple[float, ...] | None
     is_rest: bool
     reason: str
 
 
-def find_start(found: SimulatedModel, inputs: Sequence[float], given: float | None) -> Start:
-    """Return the output before the first sample, and where it is from.
+def find_start(
+    found: SimulatedModel, inputs: Sequence[float], given: float | Mapping[str, float] | None
+) -> Start:
+    """Return the outputs before the first sample, and where they are from.
 
     Parameters
     ----------
     found : SimulatedModel
     inputs : sequence of float
         First values of the inputs.
-    given : float or None
-        Output of the request.
+    given : float, mapping or None
+        Output of the request, or the outputs by column.
+
+    Raises
+    ------
+    SettingsError
+        The outputs of the request are not those of the model.
     """
     if given is not None:
-        return Start(given, False, "as given")
+        by_name = given if isinstance(given, Mapping) else dict.fromkeys(found.outputs[:1], given)
+        if set(by_name) != set(found.outputs):
+            raise SettingsError(
+                f"the model has the outputs {', '.join(found.outputs)}: give the initial_output of each by "
+                "name, or of none"
+            )
+        return Start(tuple(by_name[name] for name in found.outputs), False, "as given")
     model: Any = found.model  # each class is a frozen data class, with a hash
     rest, reason = _find_rest(model, tuple(inputs))
     if rest is not None:
@@ -242,38 +252,42 @@ def find_start(found: SimulatedModel, inputs: Sequence[float], given: float | No
     return Start(
         None,
         False,
-        "the first measured value of the record, since the model has no unique equilibrium at the "
-        f"first values of the inputs: {reason}",
+        f"the first measured value{'s' * (len(found.outputs) > 1)} of the record, since the model has no "
+        f"unique equilibrium at the first values of the inputs: {reason}",
     )
 
 
 # A slider that does not change the first values of the inputs does not change the equilibrium, whose search
 # takes longer than the simulation if the model is no polynomial of its output.
 @lru_cache(maxsize=256)
-def _find_rest(model: DynamicModel, inputs: tuple[float, ...]) -> tuple[float | None, str]:
+def _find_rest(model: AnyModel, inputs: tuple[float, ...]) -> tuple[tuple[float, ...] | None, str]:
     """Return the stable equilibrium at constant inputs, None if there is no unique one, and the reason."""
     try:
         with np.errstate(all="ignore"):
-            return find_equilibrium(model, inputs)[0], ""
+            return tuple(find_equilibrium(model, inputs)), ""
     except ModelError as error:
         return None, str(error).partition(":")[0]
 
 
-def find_first_output(recorded: Dataset) -> float:
-    """Return the first output of the record that is known."""
-    return float(recorded.y[np.isfinite(recorded.y)][0])
+def find_first_outputs(recorded: AnyRecord) -> tuple[float, ...]:
+    """Return the first value of every output of the record that is known."""
+    return tuple(float(each.y[np.isfinite(each.y)][0]) for each in recorded.records)
 
 
-def describe_start(found: SimulatedModel, output: float, reason: str) -> str:
-    """State the output before the first sample, with its reason."""
-    value = f"{found.model.output_name} is {output:.6g} {found.units[-1]}".rstrip()
-    return f"before the first sample {value}, {reason}"
+def describe_start(found: SimulatedModel, outputs: Sequence[float], reason: str) -> str:
+    """State the outputs before the first sample, with their reason."""
+    units = found.units[-len(outputs) :]
+    values = (
+        f"{name} is {value:.6g} {unit}".rstrip()
+        for name, value, unit in zip(found.outputs, outputs, units, strict=True)
+    )
+    return f"before the first sample {' and '.join(values)}, {reason}"
 
 
 def simulate_inputs(
     found: SimulatedModel,
     u: NDArray[np.float64],
-    initial: float,
+    initial: Sequence[float],
     is_rest: bool,
     start: str,
     warnings: Sequence[str],
@@ -283,8 +297,8 @@ def simulate_inputs(
     Parameters
     ----------
     u : ndarray, shape (samples, inputs)
-    initial : float
-        Output before the first sample.
+    initial : sequence of float
+        Outputs before the first sample.
     is_rest : bool
         Whether the model rests there.
     start : str
@@ -295,26 +309,27 @@ def simulate_inputs(
     # Numba takes a second to import, and the API starts without it.
     from islands.simulation.input_response import input_response  # noqa: PLC0415
 
-    model, names = found.model, found.model.column_names
+    model, names, outputs = found.model, found.model.column_names, found.outputs
     response = input_response(model, u, None if is_rest else initial, found.output_range)
     stated = list(warnings)
     if found.ranges:
         measured = list(zip(u.min(axis=0).tolist(), u.max(axis=0).tolist(), strict=True))
-        units = found.units[:-1]
+        units = found.units[: len(names)]
         stated += compare_input_ranges(names, units, found.ranges, measured, title="this response")
     if not response.outcome:
         stated.append(str(response.outcome))
+    y = response.y.reshape(len(response.y), -1)
     return {
         "dt": found.dt,
         "time_s": response.time.tolist(),
         "inputs": {name: values.tolist() for name, values in zip(names, response.u.T, strict=True)},
-        "output": response.y.tolist(),
-        "initial_output": initial,
+        "outputs": {name: values.tolist() for name, values in zip(outputs, y.T, strict=True)},
+        "initial_outputs": dict(zip(outputs, initial, strict=True)),
         "start": start,
         "outcome": str(response.outcome),
         "warnings": stated,
         "ranges": dict(zip(names, found.ranges, strict=True)) if found.ranges else {},
-        "units": dict(zip((*names, model.output_name), found.units, strict=True)),
+        "units": dict(zip((*names, *outputs), found.units, strict=True)),
     }
 
 

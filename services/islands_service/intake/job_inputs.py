@@ -67,7 +67,7 @@ def read_record_and_validation(
 
 def read_beginning(
     spec: Identification, datasets: dict[str, StoredDataset], blobs: Blobs, most: int
-) -> Dataset:
+) -> AnyRecord:
     """Read the first recording of a job, at most its first ``most`` samples, with the inputs as measured.
 
     Raises
@@ -84,7 +84,8 @@ def read_beginning(
         first, stop, _ = (parse_rows(part.rows) or slice(None)).indices(samples)
         part = Part(dataset=part.dataset, rows=f"{first}:{min(stop, first + most)}")
     measured = tuple(parse_channel_name(name).base for name in spec.inputs)
-    return _read_part(spec.model_copy(update={"inputs": measured}), part, datasets, blobs)
+    found = _read_part(spec.model_copy(update={"inputs": measured}), part, datasets, blobs)
+    return couple(found, len(spec.outputs))
 
 
 def _read_part(

@@ -86,7 +86,8 @@ function makePanel(path, output, found, signal) {
     answer = next;
     save.disabled = false;
     status.classList.remove("complaint");
-    const limits = findLimits(next.output);
+    const values = next.outputs[output];
+    const limits = findLimits(values);
     const range = limits?.map((each) => formatNumber(each)).join(" to ");
     setText(status, range ? `${output}: ${range} ${units[output]}`.trim() : `${output} diverges at once.`);
     if (next.warnings.join("\n") !== [...warnings.children].map((item) => item.textContent).join("\n"))
@@ -95,17 +96,17 @@ function makePanel(path, output, found, signal) {
     setText(start, initial);
     const moving = forms.findIndex((form) => !form.isConstant());
     const driving = names[Math.max(0, moving)];
-    response.draw([{ name: output, x: next.time_s, y: next.output }]);
+    response.draw([{ name: output, x: next.time_s, y: values }]);
     excitation.draw([{ name: label(driving), x: next.time_s, y: next.inputs[driving] }]);
     loop.draw(
       { label: label(driving), values: next.inputs[driving] },
-      { label: label(output), values: next.output },
+      { label: label(output), values },
     );
   }
 
   function saveCsv() {
     const headings = ["t_s", ...Object.keys(answer.inputs), output];
-    const table = writeTable(headings, [answer.time_s, ...Object.values(answer.inputs), answer.output]);
+    const table = writeTable(headings, [answer.time_s, ...Object.values(answer.inputs), answer.outputs[output]]);
     saveBlob(new Blob([table], { type: "text/csv" }), "response.csv");
   }
 

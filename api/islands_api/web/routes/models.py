@@ -1,5 +1,6 @@
 """Models of a job (metrics, physics checks, exports), and the whole result."""
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Response
@@ -7,7 +8,7 @@ from fastapi import APIRouter, Header, Path, Query, Response
 from islands.export import EXPORTS, MODEL_FILE, Exported, export
 from islands.persistence.models import any_model_from_json
 from islands.records.averaging import average_samples
-from islands.records.dataset import Dataset
+from islands.records.coupled import AnyRecord
 from islands_api.result_schemas import (
     DiscrepancyResult,
     IdentificationResult,
@@ -21,7 +22,7 @@ from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.model_simulation import (
     SimulatedModel,
     describe_start,
-    find_first_output,
+    find_first_outputs,
     find_start,
     make_inputs,
     read_simulated_model,
@@ -195,7 +196,7 @@ async def simulate(
 
     Each input is an excitation (hold, sine, triangle, steps, sweep, or the input of the record, scaled and
     shifted), or its samples at the sampling time of the model. The response is the free run of the model from
-    a constant output, with the numbers of the library.
+    constant outputs, with the numbers of the library.
     """
     entry = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     found = await _get_simulated_model(state, caller, entry, rank)
@@ -203,10 +204,10 @@ async def simulate(
     async with state.simulation_slots.hold(caller.owner):
         u, warnings = await state.run_blocking(make_inputs, found, request, recorded)
         begun = await state.run_blocking(find_start, found, u[0].tolist(), request.initial_output)
-    initial = begun.output
+    initial = begun.outputs
     if initial is None:
         recorded = await _get_beginning(state, caller, entry, rank, found)
-        initial = find_first_output(recorded)
+        initial = find_first_outputs(recorded)
     start, compressed = describe_start(found, initial, begun.reason), "gzip" in accept_encoding
 
     def respond() -> bytes:
@@ -224,21 +225,21 @@ async def _get_simulated_model(state: AppState, caller: Principal, entry: Job, r
     Raises
     ------
     ResultNotReadyError, ResourceNotFoundError
-        As `get_model`, or the model has several outputs.
+        As `get_model`.
     """
     key = entry.id, entry.version, rank
     model = state.simulated_models.get(key)
     if model is None:
         stored = await get_model(state, caller, entry.id, rank)
         document = await get_result(state, entry)
-        model = await state.run_blocking(read_simulated_model, entry.id, stored, document)
+        model = await state.run_blocking(read_simulated_model, stored, document)
         state.simulated_models.store(key, model)
     return model
 
 
 async def _get_beginning(
     state: AppState, caller: Principal, entry: Job, rank: int, found: SimulatedModel
-) -> Dataset:
+) -> AnyRecord:
     """Return the beginning of the record of a job at the rate of a model, from memory if it was read before.
 
     Raises
@@ -250,11 +251,11 @@ async def _get_beginning(
     if recorded is None:
         spec = parse_identification(entry.spec)
 
-        def read() -> Dataset:
+        def read() -> AnyRecord:
             name = spec.estimation[0].dataset
             datasets = {name: state.store.datasets.get(caller.owner, name, deleted=True)}
             whole = read_beginning(spec, datasets, state.blobs, found.rows)
-            return average_samples(whole, found.model.average)
+            return whole.map(partial(average_samples, count=found.model.average))
 
         async with state.inspection_slots.hold(caller.owner):
             recorded = await state.run_blocking(read)

@@ -13,7 +13,7 @@ from islands_api.simulation_schemas import SimulationRequest
 from islands_api.web.model_simulation import (
     SimulatedModel,
     describe_start,
-    find_first_output,
+    find_first_outputs,
     find_start,
     make_inputs,
     read_simulated_model,
@@ -48,7 +48,7 @@ def test_a_result_without_ranges_needs_all_inputs() -> None:
     without = SimulatedModel(MODEL, ("V", "K", "um"), (), 0.0)
     with pytest.raises(islands.SettingsError, match=r'give this input, for example \{"T_K"'):
         make({"u_V": [1.0]}, without)
-    document = simulate_inputs(without, make({"u_V": [1.0], "T_K": [9.0]}, without), 0.0, False, "", ())
+    document = simulate_inputs(without, make({"u_V": [1.0], "T_K": [9.0]}, without), (0.0,), False, "", ())
     assert (document["ranges"], document["warnings"]) == ({}, [])
 
 
@@ -63,34 +63,34 @@ def test_a_model_of_a_stored_result_has_its_ranges_and_units() -> None:
         "record": {"units": {"inputs": ["V", "K"], "output": "um"}},
         "data": {"inputs": {"estimation": [[-1.0, 3.0], [280.0, 300.0]]}, "output_range": 5.0},
     }
-    assert read_simulated_model("job", StoredModel(1, {}, model_json(MODEL)), document) == FOUND
+    assert read_simulated_model(StoredModel(1, {}, model_json(MODEL)), document) == FOUND
 
 
 def test_the_initial_output_is_given_or_an_equilibrium_or_measured() -> None:
-    assert find_start(FOUND, [1.0, 10.0], None).output == pytest.approx(4.0)
+    assert find_start(FOUND, [1.0, 10.0], None).outputs == pytest.approx((4.0,))
     given, _, reason = find_start(FOUND, [1.0, 10.0], 7.0)
-    assert describe_start(FOUND, 7.0, reason) == "before the first sample y_um is 7 um, as given"
-    assert given == 7.0
+    assert describe_start(FOUND, given, reason) == "before the first sample y_um is 7 um, as given"
+    assert given == (7.0,)
     resting = SimulatedModel(HYSTERESIS, ("", ""), (), 0.0)
     start, _, reason = find_start(resting, [1.0], None)
     assert start is None
     assert "first measured value of the record, since the model has no unique equilibrium" in reason
-    assert find_first_output(islands.Dataset(np.zeros(3), np.array([np.nan, 2.0, 3.0]), 1.0)) == 2.0
+    assert find_first_outputs(islands.Dataset(np.zeros(3), np.array([np.nan, 2.0, 3.0]), 1.0)) == (2.0,)
 
 
 def test_a_latent_model_starts_with_all_states_at_rest() -> None:
     resting = SimulatedModel(make_latent(operating_inputs=(0.5,)), ("V", "mm"), (), 1.0)
     start = find_start(resting, [0.2], None)
     assert start.is_rest
-    assert start.output is not None
-    document = simulate_inputs(resting, np.full((30, 1), 0.2), start.output, True, "", ())
-    assert document["output"] == pytest.approx([start.output] * 30, abs=1e-9)
+    assert start.outputs is not None
+    document = simulate_inputs(resting, np.full((30, 1), 0.2), start.outputs, True, "", ())
+    assert document["outputs"]["y_mm"] == pytest.approx([*start.outputs] * 30, abs=1e-9)
 
 
 def test_warnings_name_the_input_and_the_divergence() -> None:
     unstable = islands.make_model([(islands.parse("y(k-1)"), 9.0), (islands.parse("u(k-1)"), 1.0)], dt=1.0)
     found = SimulatedModel(unstable, ("", ""), ((0.0, 1.0),), 1.0)
-    document = simulate_inputs(found, np.full((50, 1), 2.0), 0.0, False, "", ("before",))
+    document = simulate_inputs(found, np.full((50, 1), 2.0), (0.0,), False, "", ("before",))
     first, left, diverged = document["warnings"]
     assert first == "before"
     assert left == "u is 2 to 2 in this response and 0 to 1 in the estimation data"
