@@ -193,10 +193,19 @@ class OutputNames(Protocol):
         """Sampling time in seconds. None if any is allowed."""
 
 
-def match_coupled(model: OutputNames, record: CoupledRecord) -> CoupledRecord:
+def match_coupled(
+    model: OutputNames, record: CoupledRecord, inputs: Sequence[str] | None = None
+) -> CoupledRecord:
     """Return a record with its columns in the order of a model.
 
     Outputs are matched by name, or by position if no name occurs in both; inputs as in `match_record`.
+
+    Parameters
+    ----------
+    model : OutputNames
+    record : CoupledRecord
+    inputs : sequence of str, optional
+        Names of the inputs in place of those of the model.
 
     Raises
     ------
@@ -214,7 +223,7 @@ def match_coupled(model: OutputNames, record: CoupledRecord) -> CoupledRecord:
         )
     return CoupledRecord(
         tuple(
-            match_record(ColumnReference(model.input_names, name, model.dt), each)
+            match_record(ColumnReference(tuple(inputs or model.input_names), name, model.dt), each)
             for name, each in zip(model.output_names, records, strict=True)
         )
     )

@@ -168,7 +168,9 @@ def match_columns(model: AnyModel, record: AnyRecord) -> AnyRecord:
             f"the model has the outputs {', '.join(model.output_names)}, the record {data.output_name}: give "
             "a record of all of them, as by as_record(frame, inputs=[...], output=[...])"
         )
-    return match_coupled(model, data)
+    # A simulation of inputs alone reads them as measured, and advances them itself.
+    is_advanced = set(data.input_names) == set(model.input_names)
+    return match_coupled(model, data, None if is_advanced else model.column_names)
 
 
 def split_start(model: AnyModel, start: Mapping[str, float]) -> tuple[list[float] | None, list[float] | None]:

@@ -15,13 +15,14 @@ from islands.facade.trials.library import take_library
 from islands.progress import Steps
 from islands.records.coupled import CoupledRecord, split_coupled
 from islands.records.dataset import Dataset
+from islands.report.documents.result_folder import result_document
 from support.coupled_systems import PREY, make_coupled_record
 from support.shared_states import make_record
 from support.undrawn import undrawn_figures
 
 
-def make_data():
-    rng = np.random.default_rng(2)
+def make_data(seed=2):
+    rng = np.random.default_rng(seed)
     u, x = rng.standard_normal((1400, 2)), np.zeros(2)
     y = np.empty((1400, 2))
     for row, inputs in enumerate(u):
@@ -72,6 +73,26 @@ def test_without_noise_all_candidates_state_the_true_poles(candidates):
     best, reason = choose_candidate(candidates, 1)
     assert best.words in reason
     assert best.assessed.validation_error < 0.005
+
+
+@pytest.mark.ci
+def test_bands_and_standard_errors_contain_the_truth(data, candidates):
+    fresh = split_coupled(make_data(7).record, 0.3).estimation
+    true = np.array([[0.02439024, 1.30487805], [-1.70731707, -0.14146341]])
+    for each in candidates:
+        found = join_candidate(data, each, "", (), {"method": "fit"}, 0, Steps())
+        band = found.bands(fresh)
+        inside = (band.lower <= fresh.y) & (fresh.y <= band.upper)
+        assert 0.85 < inside[found.best.warm_up :].mean() < 0.95
+        document = result_document(found.search_result)["models"][0]["quantities"]
+        gains = [entry for entry in document if entry["name"] == "static gain"]
+        errors = np.array([entry["value"] for entry in gains]) - true.ravel()
+        assert np.abs(errors / [entry["standard_error"] for entry in gains]).max() < 4.0
+        assert len(found.linearise().members) > 10
+        text = str(found)
+        assert "resonance" in text
+        assert "static gain of q on a" in text
+        assert found.best.model.parameter_names[0] not in text
 
 
 @pytest.mark.ci

@@ -1,6 +1,7 @@
 """Analyses of the models of a result: equation, linear system, characteristic, step response."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ import pytest
 import islands
 from islands.expressions.parsing import parse
 from islands.facade.results.model_analysis import split_point
+from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import make_model
+from support.block_cases import OF_BLOCKS
 
 
 def test_a_response_is_drawn_into_the_axes_of_the_user(result):
@@ -49,6 +52,16 @@ def test_an_operating_point_has_the_level_of_every_output_or_of_none():
     assert split_point(model, {"b": 1.0, "u": 2.0, "a": 3.0}) == ({"u": 2.0}, [3.0, 1.0])
     with pytest.raises(islands.ModelError, match="the level of each, or of none"):
         split_point(model, {"a": 1.0})
+
+
+def test_outputs_that_read_inputs_at_once_are_simulated_from_inputs_alone():
+    one = OF_BLOCKS["state space at once"]
+    both = CoupledLatentModel((one, replace(one, output_name="z_mm")))
+    u = np.random.default_rng(0).normal(size=(40, 2))
+    single, joint = (islands.FittedModel.from_model(each) for each in (one, both))
+    expected = np.column_stack([single.simulate(u).y] * 2)
+    for given in (u, {"u_V": u[:, 0], "v_V": u[:, 1]}):
+        np.testing.assert_allclose(joint.simulate(given).y, expected, rtol=1e-13)
 
 
 def test_inputs_alone_are_simulated_from_rest_as_an_array_a_frame_and_step_by_step(result):
