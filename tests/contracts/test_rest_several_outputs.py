@@ -18,6 +18,7 @@ from islands_service.store.blobs import Blobs
 from support.command_line import succeed
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.job_runs import Interruption, make_run
+from support.shared_states import make_record
 from support.stores import taken
 
 pytestmark = pytest.mark.ci
@@ -30,6 +31,7 @@ SETTINGS = {
     "library_degree": 1,
     "average": 1,
     "islands": 1,
+    "preset": "narx",
 }
 
 
@@ -145,3 +147,31 @@ def test_a_job_that_can_only_fail_is_refused(service, dataset, given, message):
     answer = httpx.post(f"{service.url}/v1/jobs", json=request)
     assert answer.status_code == 422
     assert message in answer.json()["detail"]
+
+
+def test_a_state_space_that_outputs_share_is_a_model_as_any_other(service, tmp_path):
+    record = make_record(3, (1.0,), 0.0, 600)
+    columns = [0.01 * np.arange(600), *record.u.T, *record.y.T]
+    path = tmp_path / "arm.csv"
+    head = "t_s,p_V,q_V,a_m,b_m"
+    np.savetxt(path, np.transpose(columns), delimiter=",", header=head, comments="", fmt="%.17g")
+    with Client(service.url, timeout=120.0) as client:
+        job = client.submit(
+            client.upload(path), ["p_V", "q_V"], ["a_m", "b_m"], **(SETTINGS | {"preset": "auto"})
+        )
+        outcome = run(service, job)
+        (model,) = client.models(job)
+        assert model.kind == "coupled-latent"
+        assert "share" in client.job(job).summary["words"]
+        assert b"damping ratio" in client.report(job)
+        file = tmp_path / "model.json"
+        file.write_text(client.export(job, 1, "json"))
+        saved, u = islands.load(file), np.sin(np.arange(60.0))
+        assert saved.linearise().members
+        expected = saved.simulate(np.column_stack([u, 0.5 * u])).y
+        found = client.simulate(job, 1, {"p_V": u, "q_V": 0.5 * u})
+        assert found.outputs == dict(zip(("a_m", "b_m"), map(tuple, expected.T.tolist()), strict=True))
+        assert "y2" in client.export(job, 1, "c")
+        succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "arm")
+        assert islands.load(tmp_path / "arm").best.model == saved.model
+        assert outcome.summary["size"] == saved.model.size
