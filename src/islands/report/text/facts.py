@@ -704,6 +704,11 @@ class OutputsFacts:
         return found
 
     @property
+    def shared_states(self) -> int:
+        """Number of states that all outputs share; 0 without such states."""
+        return int(self.model.get("shared_states", 0))
+
+    @property
     def reasons(self) -> Sequence[str]:
         """Why the model is recommended; empty if it was compared with no other one."""
         found: Sequence[str] = self.document["recommended"]["reasons"]
