@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.estimation.estimator_table import refinement_criterion
-from islands.estimation.latent_models import MODAL_ORDERS
 from islands.estimation.linear.identify import LARGEST_ORDER
 from islands.estimation.linear.latent import identify_joint_model
 from islands.estimation.shared_states import SharedModel, search_shared_models
@@ -187,7 +186,7 @@ def _assess(
 
 def exceeds_latent_models(found: Sequence[JointCandidate]) -> bool:
     """Return whether the best model has more states than the search of a latent model of one output."""
-    return bool(found) and choose_candidate(found, 1)[0].order > MODAL_ORDERS[-1]
+    return bool(found) and choose_candidate(found, 1)[0].order > LARGEST_ORDER
 
 
 def exceeds_equations(
