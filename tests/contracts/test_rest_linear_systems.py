@@ -46,13 +46,13 @@ def test_a_system_is_about_a_given_operating_point(identified, job):
     assert found.operating_inputs == (0.25,)
     expected = linearise(identified, job, {"u_V": 0.25}).transfer_functions()
     assert np.array_equal(found.numerators, expected[0])
-    with Client(service.url) as client:
+    with Client(identified.url) as client:
         found = client.linear_system(job, continuous="tustin")
         written = client.export_linear_system(job, continuous="tustin")
-    expected = linearise(service, job).to_continuous("tustin")
+    expected = linearise(identified, job).to_continuous("tustin")
     assert (found.dt, np.array_equal(found.A, expected.A)) == (0.0, True)
     assert written == write_linear_system(expected, "state-space", "matlab")
-    answer = service.client.get(f"/v1/jobs/{job}/models/1/linear-system", params={"continuous": "foh"})
+    answer = identified.client.get(f"/v1/jobs/{job}/models/1/linear-system", params={"continuous": "foh"})
     assert "there is no conversion 'foh'" in problem_of(answer, 422, "invalid-settings")
     for text, detail in (("u_V", "NAME=VALUE"), ("u_V=nan", "NAME=VALUE"), ("w=1", "no input w")):
         answer = identified.client.get(f"/v1/jobs/{job}/models/1/linear-system", params={"at": text})
