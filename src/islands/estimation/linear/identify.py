@@ -271,18 +271,22 @@ class Search:
         if self.high is not None:
             response = sample_high_order(self.signals, self.high)
             orders = range(1, min(self.max_order, _REDUCED_ORDER) + 1)
-            self._keep_reduced(list(reduce_model(response, orders)))
+            self._keep_reduced(reduce_model(response, orders))
         self._grow()
         best = self.best.structure
         orders = range(max(best.order - 2, 1), min(best.order + 1, self.max_order) + 1)
         if best.order > 1:
-            self._keep_reduced(list(reduce_model(sample_fit(self.best), orders, best.integrators)))
+            self._keep_reduced(reduce_model(sample_fit(self.best), orders, best.integrators))
         return [self.fits[order] for order in sorted(self.fits)]
 
     def _keep_reduced(self, reduced: Iterable[Reduced]) -> None:
         """Keep the most promising fits that begin with transfer functions."""
-        unit = float(np.log(self.signals.samples)) * self.best.structure.delays.size
-        promising = sorted(reduced, key=lambda each: each.loss + unit * (each.order + each.zeros))[:_REDUCED]
+        unit, pairs = float(np.log(self.signals.samples)), self.best.structure.delays.size
+
+        def expect(each: Reduced) -> float:
+            return each.loss + unit * (each.poles.size + pairs * each.zeros)
+
+        promising = sorted(reduced, key=expect)[:_REDUCED]
         starts = [start for each in promising for start in self._list_starts(each)]
         fits = [each for each in (project(self.signals, start) for start in starts) if each]
         if fits and not any(noise.size for noise in self.best.structure.noise):
