@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from islands.errors import RecordError
 from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
 from islands.estimation.linear.noise import WHITE, fit_noises
-from islands.estimation.linear.reduction import Reduced, reduce_model, sample_fit, sample_high_order
+from islands.estimation.linear.reduction import Reduced, Response, reduce_model, sample_fit, sample_high_order
 from islands.estimation.linear.regression import (
     Fit,
     Mode,
@@ -47,8 +47,8 @@ _SMALL = 2
 #: Steps to the levels of inputs before a recording. The error of given numerators is linear in them.
 _LEVEL_STEPS = 3
 
-#: Transfer functions that are minimised, and their largest order.
-_REDUCED, _REDUCED_ORDER = 8, 8
+#: Transfer functions that are minimised.
+_REDUCED = 8
 
 #: Steps after each of which the better half of the starts is left, and starts that are left at the end.
 _HALVINGS, _KEPT = (1, 2, 4, 8), 2
@@ -269,20 +269,32 @@ class Search:
             self.steps(f"linear model of order {order}")
             self._keep(self._fit(list(self._starts(order))))
         if self.high is not None:
-            response = sample_high_order(self.signals, self.high)
-            orders = range(1, min(self.max_order, _REDUCED_ORDER) + 1)
-            self._keep_reduced(list(reduce_model(response, orders)))
+            self._keep_reduced(self._reduce(sample_high_order(self.signals, self.high)))
         self._grow()
         best = self.best.structure
         orders = range(max(best.order - 2, 1), min(best.order + 1, self.max_order) + 1)
         if best.order > 1:
-            self._keep_reduced(list(reduce_model(sample_fit(self.best), orders, best.integrators)))
+            self._keep_reduced(reduce_model(sample_fit(self.best), orders, best.integrators))
         return [self.fits[order] for order in sorted(self.fits)]
+
+    def _expect(self, reduced: Reduced) -> float:
+        """Return the criterion that is expected of a transfer function, up to a constant."""
+        count = reduced.poles.size + self.best.structure.delays.size * reduced.zeros
+        return reduced.loss + float(np.log(self.signals.samples)) * count
+
+    def _reduce(self, response: Response) -> list[Reduced]:
+        """Return transfer functions of increasing order, as long as one of a few orders is promising."""
+        found = list[Reduced]()
+        for order in range(2, self.max_order + 1):
+            found += reduce_model(response, [order])
+            best = min(found, key=self._expect, default=None)
+            if best is None or best.order + _PATIENCE < order:
+                break
+        return found
 
     def _keep_reduced(self, reduced: Iterable[Reduced]) -> None:
         """Keep the most promising fits that begin with transfer functions."""
-        unit = float(np.log(self.signals.samples)) * self.best.structure.delays.size
-        promising = sorted(reduced, key=lambda each: each.loss + unit * (each.order + each.zeros))[:_REDUCED]
+        promising = sorted(reduced, key=self._expect)[:_REDUCED]
         starts = [start for each in promising for start in self._list_starts(each)]
         fits = [each for each in (project(self.signals, start) for start in starts) if each]
         if fits and not any(noise.size for noise in self.best.structure.noise):

@@ -92,7 +92,7 @@ def reduce_model(response: Response, orders: Iterable[int], integrators: int = 0
         count = order - integrators
         poles: Spectrum = -np.geomspace(max(low, 1e-4), 2.0 * max(high, low), count) + 0.0j
         place = _EARLIER.index(0)
-        for zeros in range(order - 1):
+        for zeros in range(order):
             found: dict[int, Reduced] = {}
             # The loss has one minimum over the dead times near those of the model.
             waiting = [place, place - 1, place + 1]

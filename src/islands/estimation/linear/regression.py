@@ -445,14 +445,9 @@ def _map_columns(
     norms = np.sqrt(np.square(equations).sum(axis=0) + np.square(columns).sum(axis=(0, 1)))
     own = np.concatenate([own[:, :, untied], columns], axis=2)
     if tied.size:
-        own = np.array(
-            [
-                np.linalg.qr(
-                    np.vstack([rows, np.zeros((max(rows.shape[1] - order, 0), rows.shape[1]))]), mode="r"
-                )
-                for rows in own
-            ]
-        )
+        # Rows of zeros, as a factor has no more rows than the matrix.
+        missing = np.zeros((recordings, max(own.shape[2] - order, 0), own.shape[2]))
+        own = np.asarray(np.linalg.qr(np.concatenate([own, missing], axis=1), mode="r"))
         equations = np.vstack([equations, *own[:, untied.size :, untied.size :]])
     return equations, own[:, : untied.size], norms
 
