@@ -53,7 +53,7 @@ def test_a_valid_job_is_accepted_and_stored_unchanged(service, dataset, changes)
         ({"inputs": ["u_V"] * 17}, "invalid-request", "/inputs: Tuple should have at most 16 items"),
         ({"inputs": ["u_V", "u_V+1"]}, "invalid-record", "column u_V is given as an input twice"),
         ({"inputs": ["u_V+2"]}, "invalid-record", "has no column u_V+2"),
-        ({"inputs": ["t_s"]}, "invalid-record", "has no time column"),
+        ({"inputs": ["t_s"]}, "invalid-record", "y_um is a static curve over t_s: the file has no time"),
         ({"inputs": []}, "invalid-request", "/inputs: Tuple should have at least 1 item"),
         (
             {"settings": {"population": 100_000, "islands": 256, "generations": 1}},

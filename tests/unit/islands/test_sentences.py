@@ -35,7 +35,7 @@ def choice(**details):
     return {"choice": ColumnChoice(("u",), "y", 0.9, "choice_given"), "compared": None, **names, **details}
 
 
-RESTS = [fact(inputs=inputs, motion=(0.1, 0.02)) for inputs in (("u",), ("u", "v"))]
+RESTS = [fact(inputs=inputs, motion=(0.1, rate)) for inputs in (("u",), ("u", "v")) for rate in (0.0, 0.02)]
 
 LINEAR = [
     {
@@ -81,6 +81,10 @@ RECORD = {
     "rate_oversampled": [fact(is_noisy=each) for each in (True, False)],
     **{f"rate_{each}": [fact()] for each in ("unconnected", "low", "suitable")},
     "linear_constant": [fact()],
+    "feedback_unknown": [fact()],
+    "feedback_none": [fact()],
+    "feedback_visible": [fact(inputs=("u",)), fact(inputs=("u", "v"))],
+    "feedback_unstable": [fact(inputs=names, pole=1.02, seconds=0.3) for names in (("u",), ("u", "v"))],
     **{f"linear_{each}": [fact(**values) for values in LINEAR] for each in ("within", "disturbed", "not")},
     **{
         f"choice_{each}": [choice()]

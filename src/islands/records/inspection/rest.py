@@ -65,7 +65,8 @@ def check_rest(record: Dataset) -> Fact:
     excess = output - inputs
     rests = bool(np.median(excess) <= _RESTS)
     share = float(np.mean((excess <= _RESTS) == rests))
-    shares = tuple(float(np.median(part)) for part in (output, inputs))
+    # Inputs that move by less than half a per cent are at rest.
+    shares = float(np.median(output)), round(float(np.median(inputs)), 2)
     details = {"inputs": record.input_names, "motion": shares}
     finding = "rest_rests" if rests else "rest_moves"
     return Fact("rest", record.output_name, finding, rests, confidence=share, details=details)
