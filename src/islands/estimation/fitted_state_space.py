@@ -1,7 +1,7 @@
 """State space with units and estimated parameters, the individual of a search for latent models."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from islands.estimation.constraints.state_space import NO_CONDITIONS, StateSpaceConditions
 from islands.estimation.latent_data import LatentData, measure_held_out
 from islands.estimation.state_space_fit import StateSpaceFit
-from islands.models.latent import StateSpaceLayout, reads_at_once
+from islands.models.latent import ZERO_BLOCKS, StateSpaceLayout, reads_at_once
 from islands.models.unit_functions import find_codes, parse_unit
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes
@@ -143,6 +143,15 @@ class Draft:
             self.states[:, kept],
             delays=self.delays,
         )
+
+    def restrict(self, structure: str) -> "Draft":
+        """Return the draft with the zeros of a structure, an entry of ``ZERO_BLOCKS``."""
+        free = self.free.copy()
+        blocks = self.layout.split(free)
+        blocks["W of the states"] = blocks["W"][:, : self.layout.order]
+        for name in ZERO_BLOCKS[structure]:
+            blocks[name][...] = False
+        return replace(self, free=free)
 
     def begin(
         self, segments: SegmentLanes, conditions: StateSpaceConditions = NO_CONDITIONS

@@ -162,7 +162,12 @@ def find_front(systems: Sequence[FittedStateSpace], gain: float = _NEGLIGIBLE) -
 
 
 def estimate_models(
-    front: Sequence[FittedStateSpace], record: Dataset, steps: Steps, constraints: str = "none"
+    front: Sequence[FittedStateSpace],
+    record: Dataset,
+    steps: Steps,
+    constraints: str = "none",
+    *,
+    direct: bool = True,
 ) -> list[LatentModel]:
     """Reduce the systems of a front, estimate them on longer blocks, and return the models.
 
@@ -177,13 +182,15 @@ def estimate_models(
     steps : Steps
     constraints : str
         Statements about the models; see `find_conditions`. Systems that cannot meet them are left out.
+    direct : bool
+        Whether the output may read an input at sample k.
     """
     if not front:
         return []
     steps.report("final estimation of state spaces", 0.7)
     data = make_latent_data(record, constraints)
     with ThreadPoolExecutor() as threads:
-        best = _remove_blocks(front[-1], data, direct=True)
+        best = _remove_blocks(front[-1], data, direct=direct)
         direct = best.reads_at_once
         left = front[:-1] if direct else front
         reduced = list(threads.map(partial(_remove_blocks, data=data, direct=direct), left))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.random import Generator, SeedSequence
 from threadpoolctl import threadpool_limits
 
+from islands.estimation.curve_models import add_curves
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import find_front, fit_linear_systems, make_latent_model, make_odd
@@ -99,11 +100,14 @@ class LatentProblem:
     settings : Settings
     linear : tuple of FittedStateSpace
         Linear systems, the starts of the first populations.
+    curves : tuple of FittedStateSpace
+        Linear systems with one curve, which the first elite contains.
     """
 
     record: Dataset
     settings: Settings
     linear: tuple[FittedStateSpace, ...]
+    curves: tuple[FittedStateSpace, ...] = ()
 
     @property
     def data(self) -> LatentData:
@@ -129,15 +133,17 @@ class LatentProblem:
 
 
 def make_latent_problem(record: Dataset, settings: Settings, steps: Steps) -> LatentProblem:
-    """Make a search problem; fit its linear systems.
+    """Make a search problem; fit its linear systems, and those with one curve.
 
     Raises
     ------
     StoppedError
         A stop is requested before the first linear system.
     """
-    data = make_latent_data(record, settings.constraints)
-    return LatentProblem(record, settings, tuple(fit_linear_systems(data.without_statics(), steps)))
+    data = make_latent_data(record, settings.constraints).without_statics()
+    linear = fit_linear_systems(data, steps)
+    curves = add_curves(linear, data, settings.structure, steps=steps)
+    return LatentProblem(record, settings, tuple(linear), tuple(curves))
 
 
 class LatentEvolution:
@@ -170,7 +176,7 @@ class LatentEvolution:
             begin_system(system, units, settings.structure, _make_generator(seed, index, 0, place))
             for place, (system, units) in enumerate(starts[at] for at in drawn)
         ]
-        elite = tuple(self.problem.linear)
+        elite = (*self.problem.linear, *self.problem.curves)
         empty = Island(index, seed, 0, (), elite, with_entries(HallOfFame(), elite))
         return self._evaluate(empty, drafts)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.latent_data import LatentData
 from islands.kernels.state_space import simulate_states
-from islands.models.latent import ZERO_BLOCKS, StateSpaceLayout
+from islands.models.latent import StateSpaceLayout
 from islands.models.unit_functions import (
     ARGUMENT,
     FUNCTIONS,
@@ -59,7 +59,7 @@ Blocks = dict[str, NDArray[Any]]
 def begin_system(linear: FittedStateSpace, units: Sequence[str], structure: str, rng: Generator) -> Draft:
     """Return a draft of a linear system with units, which have random arguments and negligible effects."""
     drawn = [_draw_unit(linear, unit, rng) for unit in units]
-    return _restrict(_append_units(linear.draft(), drawn), structure)
+    return _append_units(linear.draft(), drawn).restrict(structure)
 
 
 def cross(
@@ -90,7 +90,8 @@ def cross(
     read = np.repeat([used[: other.order].any(), used[other.order :].any()], [system.order, other.inputs])
     moved = np.full(system.order, free["E"][:, unit].any())
     is_free = {"E": moved, "F": free["F"][[unit]], "W": read, "s": np.ones(1, bool)}
-    return _restrict(_append_units(system.draft(), [_NewUnit(other.units[unit], values, is_free)]), structure)
+    unit_of_other = _NewUnit(other.units[unit], values, is_free)
+    return _append_units(system.draft(), [unit_of_other]).restrict(structure)
 
 
 def mutate(system: FittedStateSpace, structure: str, rng: Generator) -> Draft:
@@ -99,7 +100,7 @@ def mutate(system: FittedStateSpace, structure: str, rng: Generator) -> Draft:
     weights = np.array([_MUTATIONS[name][0] for name in names])
     drawn = names[int(rng.choice(len(names), p=weights / weights.sum()))]
     found = _MUTATIONS[drawn][1](system, rng)
-    return _continue(system, rng) if found is None else _restrict(found, structure)
+    return _continue(system, rng) if found is None else found.restrict(structure)
 
 
 def _simulate_states(system: FittedStateSpace, data: LatentData) -> NDArray[np.float64]:
@@ -169,16 +170,6 @@ def _join(
     theta, free = (np.concatenate([blocks[name].ravel() for name in layout.blocks]) for blocks in parts)
     first = effect_steps if units else 0
     return Draft(layout, units, theta, free.astype(bool), states, STEPS, first, draft.delays)
-
-
-def _restrict(draft: Draft, structure: str) -> Draft:
-    """Return a draft with the zeros of a structure, an entry of ``ZERO_BLOCKS``."""
-    free = draft.free.copy()
-    blocks = draft.layout.split(free)
-    blocks["W of the states"] = blocks["W"][:, : draft.layout.order]
-    for name in ZERO_BLOCKS[structure]:
-        blocks[name][...] = False
-    return replace(draft, free=free)
 
 
 def _add_unit(system: FittedStateSpace, rng: Generator) -> Draft | None:

@@ -27,7 +27,7 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.linear_comparison import assess_linear_model
+from islands.validation.linear_comparison import assess_curve_models, assess_linear_model
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import (
     Recommendation,
@@ -45,6 +45,9 @@ BANDS = "prediction bands"
 
 #: Name of the step that identifies the linear model of the same data.
 LINEAR_MODEL = "linear model"
+
+#: Name of the step that identifies linear models with one curve.
+CURVE_MODELS = "linear models with one curve"
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,22 +299,41 @@ def ignore_result(_found: SearchResult, /) -> None:
     """Ignore a result."""
 
 
-def list_linear_models(
+def list_simple_models(
     split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
 ) -> list[Assessment]:
-    """Return the linear model of the data of a search, which is one of its models; empty without one.
+    """Return the linear model of the data of a search, and those with one curve, which are among its models.
 
     Parameters
     ----------
     split, shooting, warm_up, constraints
         As for `assess_linear_model`.
     steps : Steps
-        The identification is an optional step.
+        Each identification is an optional step.
     """
+    return [
+        *list_linear_models(split, shooting, warm_up, constraints, steps),
+        *list_curve_models(split, shooting, warm_up, constraints, steps),
+    ]
+
+
+def list_linear_models(
+    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
+) -> list[Assessment]:
+    """Return the linear model of the data of a search, which is one of its models; empty without one."""
     steps.report(LINEAR_MODEL, None)
     compute = partial(assess_linear_model, split, shooting, warm_up, constraints, steps)
     found = steps.attempt(LINEAR_MODEL, compute)
     return [found] if found else []
+
+
+def list_curve_models(
+    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
+) -> list[Assessment]:
+    """Return linear models with one curve; empty without one."""
+    steps.report(CURVE_MODELS, None)
+    compute = partial(assess_curve_models, split, shooting, warm_up, constraints, steps)
+    return steps.attempt(CURVE_MODELS, compute) or []
 
 
 def as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:

@@ -28,6 +28,7 @@ from islands.evolution.search_result import (
     as_candidate,
     ignore_result,
     list_linear_models,
+    list_simple_models,
     rank_models,
     with_average,
     with_bands,
@@ -283,20 +284,24 @@ def identify_record(
         )
     described = {**_describe_preset(preset), **_describe(settings), "validation": held_out}
     statistics = _make_statistics(state, hall_of_fame, search_problem)
-    linear = _list_linear_models(split, scaled, steps)
-    models, candidates = rank_models([*models, *linear]), [*candidates, *map(as_candidate, linear)]
-    warm_up = max([settings.maximum_lag, *(entry.model.maximum_lag for entry in linear)])
+    simple = _list_simple_models(split, scaled, steps, chosen=isinstance(preset, Choice))
+    models, candidates = rank_models([*models, *simple]), [*candidates, *map(as_candidate, simple)]
+    warm_up = max([settings.maximum_lag, *(entry.model.maximum_lag for entry in simple)])
     found = SearchResult(record, split, seed, described, statistics, models)
     on_models(with_average(found, count))
     banded = with_bands(found, candidates, settings.constraints, warm_up, steps)
     return Result.from_search(refit_models(with_average(banded, count), validation, steps))
 
 
-def _list_linear_models(split: Split, settings: Settings, steps: Steps) -> list[Assessment]:
-    """Return the linear model, unless the settings select by another error or state the noise."""
+def _list_simple_models(split: Split, settings: Settings, steps: Steps, *, chosen: bool) -> list[Assessment]:
+    """Return the linear model, and those with one curve if the preset is chosen automatically.
+
+    There are none if the settings select by another error or state the noise.
+    """
     if settings.select == "fitness" or settings.estimator not in ("", "free-run"):
         return []
-    return list_linear_models(split, settings.shooting, settings.maximum_lag, settings.constraints, steps)
+    list_models = list_simple_models if chosen else list_linear_models
+    return list_models(split, settings.shooting, settings.maximum_lag, settings.constraints, steps)
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:

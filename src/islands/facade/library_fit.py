@@ -31,12 +31,14 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, Population
+from islands.evolution.presets import AUTO
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
     as_candidate,
     keep_best_of_sizes,
     list_linear_models,
+    list_simple_models,
     rank_models,
     state_steps,
     with_average,
@@ -251,9 +253,11 @@ def fit_library(
         result, refined = steps.attempt(REFINEMENT, refine_all) or (result, [])
         models += refined
     if settings.selecting_estimator in _SIMULATING:
-        linear = list_linear_models(split, interval, warm_up, library.constraints, steps)
-        result = replace(result, models=rank_models([*result.models, *linear]))
-        models += linear
+        # A library that the user names has no models of another kind, besides the linear one.
+        list_models = list_simple_models if settings.library == AUTO else list_linear_models
+        simple = list_models(split, interval, warm_up, library.constraints, steps)
+        result = replace(result, models=rank_models([*result.models, *simple]))
+        models += simple
     estimates = [as_candidate(entry) for entry in models]
     warm_up = max(warm_up, *(entry.model.maximum_lag for entry in models))
 

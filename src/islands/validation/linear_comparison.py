@@ -1,7 +1,8 @@
-"""Linear model of the data of a search, which competes with the other models and shows what they gain."""
+"""Simplest models of the data of a search, which compete with the others: linear, and with one curve."""
 
 from islands.errors import RecordError
-from islands.estimation.estimator_table import BOX_JENKINS
+from islands.estimation.curve_models import identify_curve_models
+from islands.estimation.estimator_table import BOX_JENKINS, refinement_criterion
 from islands.estimation.linear.latent import identify_linear_model
 from islands.estimation.parameter_constraints import constraint
 from islands.progress import Steps
@@ -41,3 +42,31 @@ def assess_linear_model(
     except RecordError:
         return None
     return found if all(check.met for check in found.constraints) else None
+
+
+def assess_curve_models(
+    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
+) -> list[Assessment]:
+    """Identify linear models with one curve of the estimation data and assess them.
+
+    Parameters
+    ----------
+    split, shooting, warm_up, constraints, steps
+        As for `assess_linear_model`.
+
+    Returns
+    -------
+    list of Assessment
+        Those that meet the constraints; none if the data are too short.
+    """
+    if constraint(constraints).sums:
+        return []
+    try:
+        models = identify_curve_models(split.estimation, steps)
+        first = max([warm_up, *(model.maximum_lag for model in models)])
+        found = [
+            assess(model, split, shooting, first, constraints, refinement_criterion(None)) for model in models
+        ]
+    except RecordError:
+        return []
+    return [each for each in found if all(check.met for check in each.constraints)]
