@@ -23,7 +23,7 @@ from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import metrics
-from islands.validation.recommendation import compare_blocks, is_sound
+from islands.validation.recommendation import is_sound
 from support.laws import LAWS, Law
 
 #: Noise as a fraction of the standard deviation of the output.
@@ -34,6 +34,9 @@ _TEST = 1000
 
 #: Largest ratio of the test error to the least test error of all models.
 _CLOSE = 1.2
+
+#: Largest number of consecutive blocks of the validation data whose errors are compared between models.
+_BLOCKS = 20
 
 Rule = Callable[[SearchResult], int]
 
@@ -65,6 +68,34 @@ class Case:
     def ratio(self, rule: str) -> float:
         """Ratio of the test error of the chosen model to the least one."""
         return max(self.errors[self.chosen[rule]], self.rounding) / max(min(self.errors), self.rounding)
+
+
+def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean squared errors of two models on blocks of the samples that both predict.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (samples,)
+        `Assessment.squared_errors` on the same validation data. The numbers of samples differ if the samples
+        are means of different numbers of samples; samples at the same part of the data are then compared.
+
+    Returns
+    -------
+    ndarray, shape (2, blocks)
+        At most `_BLOCKS` consecutive blocks; none if no sample is predicted by both.
+    """
+    common = [_select_common(one, other), _select_common(other, one)]
+    count = min(_BLOCKS, *map(len, common))
+    blocks = [np.array_split(errors, count) if count else [] for errors in common]
+    return np.array([[np.add.reduce(block) / len(block) for block in each] for each in blocks])
+
+
+def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the errors at the samples that both models predict."""
+    if not (len(errors) and len(others)):
+        return np.empty(0)
+    at = (2 * np.arange(len(errors)) + 1) * len(others) // (2 * len(errors))  # middle of the sample
+    return errors[~(np.isnan(errors) | np.isnan(others[at]))]
 
 
 def sound(found: SearchResult) -> list[int]:

@@ -211,10 +211,10 @@ class LatentModel(ParametricModel):
 
         Those of a linear model are its poles, the numerators and direct paths of every input, its dead times,
         and the level or the drift; the coordinates of the states add further parameters to the equations. Of
-        a model with units all parameters are counted.
+        a model with units, the scale of every state is one.
         """
         if self.units:
-            return self.size
+            return self.size - self.order
         numerators = sum(name[0] in "bd" for name in self.names)
         has_level = any(name[0] in "lo" for name in self.names)
         return self.order + numerators + sum(map(bool, self.delays)) + has_level

@@ -215,11 +215,6 @@ class Assessment:
         return count_effective(self.errors, split.estimation.samples + split.validation.samples)
 
     @property
-    def unexplained(self) -> float:
-        """Part of the variance of the output that the free run on the validation data does not explain."""
-        return 1.0 - self.metrics["validation"]["free_run"].r2
-
-    @property
     def squared_errors(self) -> NDArray[np.float64]:
         """Squares of the errors, shape (samples,)."""
         with np.errstate(over="ignore"):
@@ -365,18 +360,20 @@ def average_errors(assessment: Assessment, count: int) -> Assessment:
     ----------
     assessment : Assessment
     count : int
-        Samples of a mean. The errors and the RMSE of the free run on the validation data are replaced, unless
-        it diverged.
+        Samples of a mean. The errors of the free run on the validation data are replaced, unless it diverged,
+        and the RMSE of both parts, by the same factor.
     """
     whole = len(assessment.errors) // count * count
     if count == 1 or not whole:
         return assessment
     errors = assessment.errors[:whole].reshape(-1, count).mean(axis=1)
     before, after = (float(np.sqrt(np.nanmean(each**2))) for each in (assessment.errors, errors))
-    validation = assessment.metrics["validation"]
-    rmse = validation["free_run"].rmse * (after / before if before > 0.0 else 1.0)
-    changed = {**validation, "free_run": replace(validation["free_run"], rmse=rmse)}
-    return replace(assessment, errors=errors, metrics={**assessment.metrics, "validation": changed})
+    ratio = after / before if before > 0.0 else 1.0
+    averaged = {
+        part: {**found, "free_run": replace(found["free_run"], rmse=ratio * found["free_run"].rmse)}
+        for part, found in assessment.metrics.items()
+    }
+    return replace(assessment, errors=errors, metrics=averaged)
 
 
 def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Metrics]:

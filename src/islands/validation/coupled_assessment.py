@@ -124,11 +124,6 @@ class CoupledAssessment:
         samples = self.split.estimation.samples + self.split.validation.samples
         return sum(count_effective(each, samples) for each in self.errors.T)
 
-    @property
-    def unexplained(self) -> float:
-        """Mean over the outputs of the part of the variance that the free run does not explain."""
-        return float(np.mean([1.0 - each["validation"]["free_run"].r2 for each in self.metrics.values()]))
-
     def measure_residual(self, place: int) -> ResidualStructure:
         """Measure the residuals of an output on the longest recording of the validation data."""
         data = self.split.validation

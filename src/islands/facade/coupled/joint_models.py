@@ -48,10 +48,13 @@ from islands.report.documents.result_folder import record_document
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, EnsembleStructure, ValidatedModel, make_ensemble
 from islands.validation.prediction_bands import OutputBands, calibrate_output_bands
-from islands.validation.recommendation import LARGEST_RATIO, measure_size, recommend_joint
+from islands.validation.recommendation import measure_size, recommend_joint
 
 #: The linear model is estimated by the error of the free run.
 _CRITERION = refinement_criterion(None)
+
+#: Error of a trial of equations, relative to that of a joint model, from which they are not searched.
+_LARGEST_RATIO = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,7 +213,7 @@ def exceeds_equations(
     best = choose_candidate(found, 1)[0] if found else None
     if best is None or best.size <= terms:
         return False
-    limit, total = LARGEST_RATIO * best.assessed.validation_error, 0.0
+    limit, total = _LARGEST_RATIO * best.assessed.validation_error, 0.0
     for place, each in enumerate(data.estimation.records):
         steps.report(f"trial of an equation of {each.output_name}", None)
         error = min(measure_library(hold_out(data.estimation.separate(place)), trial, steps))
@@ -237,8 +240,8 @@ def choose_candidate(candidates: Sequence[JointCandidate], terms: int) -> tuple[
         return best, ""
     others = "; ".join(_describe(each) for each in candidates if each is not best)
     return best, (
-        "by the information criterion of the common free run on all data, and by its error on the validation "
-        f"data, the root mean square over the outputs: {_describe(best)}; compared with {others}"
+        "most evidence (information criterion of the common free run on all data); error on the validation "
+        f"data (root mean square over the outputs): {_describe(best)}; compared with {others}"
     )
 
 
