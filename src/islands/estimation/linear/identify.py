@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from islands.errors import RecordError
 from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
 from islands.estimation.linear.noise import WHITE, fit_noises
-from islands.estimation.linear.reduction import Reduced, Response, reduce_model, sample_fit, sample_high_order
+from islands.estimation.linear.reduction import Reduced, reduce_model, sample_fit, sample_high_order
 from islands.estimation.linear.regression import (
     Fit,
     Mode,
@@ -47,8 +47,8 @@ _SMALL = 2
 #: Steps to the levels of inputs before a recording. The error of given numerators is linear in them.
 _LEVEL_STEPS = 3
 
-#: Transfer functions that are minimised.
-_REDUCED = 8
+#: Transfer functions that are minimised, and the largest order of those that are tried first.
+_REDUCED, _GROUP = 8, 8
 
 #: Steps after each of which the better half of the starts is left, and starts that are left at the end.
 _HALVINGS, _KEPT = (1, 2, 4, 8), 2
@@ -269,7 +269,13 @@ class Search:
             self.steps(f"linear model of order {order}")
             self._keep(self._fit(list(self._starts(order))))
         if self.high is not None:
-            self._keep_reduced(self._reduce(sample_high_order(self.signals, self.high)))
+            response = sample_high_order(self.signals, self.high)
+            small = list(reduce_model(response, range(2, min(_GROUP, self.max_order) + 1)))
+            # Many modes are a sum, whose zeros are all free.
+            large = list(reduce_model(response, range(_GROUP + 1, self.max_order + 1), excess=1))
+            self._keep_reduced(small)
+            if min(map(self._expect, large), default=np.inf) < min(map(self._expect, small), default=np.inf):
+                self._keep_reduced(large)
         self._grow()
         best = self.best.structure
         orders = range(max(best.order - 2, 1), min(best.order + 1, self.max_order) + 1)
@@ -281,16 +287,6 @@ class Search:
         """Return the criterion that is expected of a transfer function, up to a constant."""
         count = reduced.poles.size + self.best.structure.delays.size * reduced.zeros
         return reduced.loss + float(np.log(self.signals.samples)) * count
-
-    def _reduce(self, response: Response) -> list[Reduced]:
-        """Return transfer functions of increasing order, as long as one of a few orders is promising."""
-        found = list[Reduced]()
-        for order in range(2, self.max_order + 1):
-            found += reduce_model(response, [order])
-            best = min(found, key=self._expect, default=None)
-            if best is None or best.order + _PATIENCE < order:
-                break
-        return found
 
     def _keep_reduced(self, reduced: Iterable[Reduced]) -> None:
         """Keep the most promising fits that begin with transfer functions."""
@@ -466,7 +462,7 @@ class Search:
         """Yield structures with more or fewer zeros, and modes in the response to more or fewer inputs."""
         excess = structure.excess
         orders = np.repeat(structure.drives, [part.size for part in structure.parts], axis=2).sum(axis=2)
-        for zeros in range(max(structure.order - 1, 0)):
+        for zeros in range(structure.order):
             yield replace(structure, excess=np.maximum(orders - zeros, 1))
         for place in np.ndindex(excess.shape):
             for change in (-1, 1):

@@ -75,8 +75,10 @@ class Response(NamedTuple):
     delays: NDArray[np.int64]
 
 
-def reduce_model(response: Response, orders: Iterable[int], integrators: int = 0) -> Iterator[Reduced]:
-    """Yield a transfer function for each order and number of zeros."""
+def reduce_model(
+    response: Response, orders: Iterable[int], integrators: int = 0, excess: int = 2
+) -> Iterator[Reduced]:
+    """Yield a transfer function for each order and each number of zeros, less by an excess or more."""
     frequencies = response.frequencies
     s = 1j * frequencies
     # In units of the integrators, and of the input that is held.
@@ -92,7 +94,7 @@ def reduce_model(response: Response, orders: Iterable[int], integrators: int = 0
         count = order - integrators
         poles: Spectrum = -np.geomspace(max(low, 1e-4), 2.0 * max(high, low), count) + 0.0j
         place = _EARLIER.index(0)
-        for zeros in range(order):
+        for zeros in range(order - excess + 1):
             found: dict[int, Reduced] = {}
             # The loss has one minimum over the dead times near those of the model.
             waiting = [place, place - 1, place + 1]
