@@ -94,7 +94,8 @@ def describe_equation(best: islands.FittedModel) -> str:
     """Return a short equation with four digits, the number of its terms, or what a state space is."""
     model = best.model
     if not isinstance(model, islands.Model):
-        return "; ".join(best.linearise().describe())
+        curves = [f"order {model.order} with a curve: {unit}" for unit in model.units]
+        return "; ".join([*curves, *best.linearise().describe()])
     if model.size > _SHORT:
         return f"{model.size} terms"
     terms = zip(model.parameters, model.equation().terms, strict=True)
