@@ -252,7 +252,7 @@ class Settings:
     select: str = setting(
         "validation",
         "What recommends a model: validation, or fitness, the error on the estimation data. `validation` "
-        "takes the smallest model that is as good as the best on the validation data. `fitness` takes the "
+        "takes the simplest model with the most evidence in the free run on all data. `fitness` takes the "
         "model with the least error of the search, as Appendix A of the paper; its free run may diverge.",
         choices=SELECTIONS,
     )

@@ -107,7 +107,7 @@ class Result:
 
     @property
     def best(self) -> FittedModel:
-        """Recommended model: the smallest one that is as good as the one with the least validation error.
+        """Recommended model: the simplest one with the most evidence.
 
         ``result.models[0]`` has the least free-run error on the validation data.
         """
