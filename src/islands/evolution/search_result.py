@@ -27,7 +27,6 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.linear_comparison import assess_curve_models, assess_linear_model
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import (
     Recommendation,
@@ -36,6 +35,7 @@ from islands.validation.recommendation import (
     recommend,
     recommend_fittest,
 )
+from islands.validation.simple_models import assess_curve_models, assess_linear_model
 
 #: Result of the same search.
 FoundT = TypeVar("FoundT", bound="SearchResult | CoupledSearchResult")

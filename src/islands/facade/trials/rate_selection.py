@@ -26,7 +26,7 @@ from islands.records.split import Split, average_split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation
-from islands.validation.linear_comparison import assess_linear_model
+from islands.validation.simple_models import assess_linear_model
 
 #: Samples are averaged if the error is at most this fraction of the error without averaging.
 CLEAR_GAIN = 0.8
