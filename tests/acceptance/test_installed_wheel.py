@@ -53,7 +53,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def model(folder: Path) -> str:
     """The best model of a fit."""
-    succeed("fit", "piezo.csv", *COLUMNS, "--max-terms", 4, "--out", "fit", folder=folder)
+    succeed(
+        "fit",
+        "piezo.csv",
+        *COLUMNS,
+        "--library",
+        "phi-polynomial",
+        "--max-terms",
+        4,
+        "--out",
+        "fit",
+        folder=folder,
+    )
     return "fit/models/01.json"
 
 
