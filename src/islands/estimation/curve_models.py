@@ -70,7 +70,7 @@ def identify_curve_models(record: Dataset, steps: Steps) -> list[LatentModel]:
     shared = _share_models(record)
     if not shared:
         data = make_latent_data(record)
-        linear = fit_linear_systems(data, steps)
+        linear = fit_linear_systems(record, data, steps)
         front = find_front([*linear, *add_curves(linear, data, steps=steps)], _GAIN)
         direct = all(parse_channel_name(name).at_once for name in record.input_names)
         shared += estimate_models([each for each in front if each.units], record, steps, direct=direct)

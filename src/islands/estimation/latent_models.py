@@ -73,13 +73,20 @@ def search_linear_models(record: Dataset, steps: Steps) -> list[LatentModel]:
         first; the last one has the least error. Empty if the record is too short.
     """
     data = make_latent_data(record)
-    return estimate_models(find_front(fit_linear_systems(data, steps)), record, steps)
+    return estimate_models(find_front(fit_linear_systems(record, data, steps)), record, steps)
 
 
-def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]:
+def fit_linear_systems(record: Dataset, data: LatentData, steps: Steps) -> list[FittedStateSpace]:
     """Fit linear systems of several orders to the blocks, from the linear models of the record.
 
-    The dead times are those of the best linear model, or none.
+    The dead times are those of the best linear model, or none. A direct path is estimated with the systems.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record of the data, whose inputs need not be read one sample early.
+    data : LatentData
+    steps : Steps
 
     Raises
     ------
@@ -88,7 +95,7 @@ def fit_linear_systems(data: LatentData, steps: Steps) -> list[FittedStateSpace]
     StoppedError
         A stop is requested.
     """
-    models = identify_linear_models(data.record, steps)
+    models = identify_linear_models(record, steps)
     drafts = [
         _begin(model, delays, data)
         for model in sorted(models, key=lambda model: model.order)

@@ -141,7 +141,7 @@ def make_latent_problem(record: Dataset, settings: Settings, steps: Steps) -> La
         A stop is requested before the first linear system.
     """
     data = make_latent_data(record, settings.constraints).without_statics()
-    linear = fit_linear_systems(data, steps)
+    linear = fit_linear_systems(record, data, steps)
     curves = add_curves(linear, data, settings.structure, steps=steps)
     return LatentProblem(record, settings, tuple(linear), tuple(curves))
 

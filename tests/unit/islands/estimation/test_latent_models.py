@@ -30,7 +30,7 @@ def resonances_record(samples):
 
 
 def fit(record):
-    return fit_linear_systems(make_latent_data(record), Steps())
+    return fit_linear_systems(record, make_latent_data(record), Steps())
 
 
 @pytest.mark.ci

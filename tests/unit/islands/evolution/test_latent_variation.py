@@ -13,15 +13,17 @@ from islands.models.unit_functions import parse_unit
 from islands.progress import Steps
 from support.latent_systems import spring_record
 
+RECORD = spring_record(300, noise=0.02)
+
 
 @pytest.fixture(scope="module")
 def data():
-    return make_latent_data(spring_record(300, noise=0.02))
+    return make_latent_data(RECORD)
 
 
 @pytest.fixture(scope="module")
 def linear(data):
-    return fit_linear_systems(data, Steps())
+    return fit_linear_systems(RECORD, data, Steps())
 
 
 @pytest.fixture(scope="module")
