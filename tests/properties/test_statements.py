@@ -180,6 +180,7 @@ def change_output(output, choices, lost):
     }
 
 
+@pytest.mark.ci
 @given(st.tuples(OUTPUTS, OUTPUTS), st.booleans(), st.sampled_from([1.0, 3.0]))
 def test_no_two_sentences_about_several_outputs_contradict_each_other(choices, lost, widening):
     base = found_together()

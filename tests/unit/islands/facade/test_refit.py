@@ -20,6 +20,8 @@ from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.metrics import metrics
 from support.noisy_records import TERMS, make_noisy_record
 
+pytestmark = pytest.mark.ci
+
 LAW = {"library": "polynomial", "degree": 2, "lags": 1, "max_terms": 3, "average": 1, "certificate": 0}
 
 

@@ -54,6 +54,7 @@ def drive(samples, seed, amplitude):
     return islands.Dataset(u, x + 0.002 * np.random.default_rng(seed).standard_normal(samples), 1.0)
 
 
+@pytest.mark.ci
 def test_a_band_allows_for_the_error_of_the_structure_outside_of_the_data():
     best = islands.fit(drive(600, 0, 1.0), library="polynomial", degree=2, lags=2, max_terms=4).best
     new = drive(600, 1, 2.0)

@@ -67,6 +67,7 @@ def test_a_document_keeps_dead_times_and_errors(found):
     assert again.known_errors == pytest.approx(model.known_errors, nan_ok=True)
 
 
+@pytest.mark.ci
 def test_an_input_that_acts_within_the_sample_is_read_early():
     record = make_record(direct=0.5)
     early = identify_linear_model(advance_all_inputs(record))

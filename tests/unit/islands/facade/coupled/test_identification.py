@@ -19,6 +19,8 @@ from islands.progress import StoppedError
 from support.coupled_systems import PREY, TWO_MASSES, make_coupled_record
 from support.undrawn import undrawn_figures
 
+pytestmark = pytest.mark.ci
+
 #: A small search.
 FAST = {"degree": 2, "lags": 2, "max_terms": 4, "average": 1, "certificate": 0}
 

@@ -6,6 +6,8 @@ import pytest
 import islands
 from support.searches import record
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture(scope="module")
 def small():

@@ -70,6 +70,7 @@ def test_a_record_that_permits_no_means_keeps_its_sampling_time(record, least):
     assert select_rate(data, "auto", TRIAL, least) == (data, 1)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("noise", [0.01, 0.05, 0.3])
 def test_a_record_with_little_or_much_noise_is_averaged(noise):
     assert select_rate(split(lag(noise)), "auto", TRIAL, 6)[1] > 1
@@ -94,6 +95,7 @@ def measurements(result):
     return [(each.model.parameters, each.metrics) for each in result.models]
 
 
+@pytest.mark.ci
 def test_a_resumed_run_on_means_equals_an_uninterrupted_one():
     states = []
     found = identify_in_two_epochs(SHORT, average=5, on_epoch=lambda state, _: states.append(state))

@@ -175,6 +175,7 @@ def test_unusable_data_are_refused_with_the_remedy(data, arguments, message):
         islands.as_record(data, **arguments)
 
 
+@pytest.mark.ci
 def test_fit_of_a_frame_equals_fit_of_the_record():
     settings = {"library": "polynomial", "degree": 1, "max_terms": 3}
     ends = FRAME.iloc[:300], FRAME.iloc[300:]

@@ -11,6 +11,8 @@ from islands.report.pages.identification import report_saved_result
 from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.identifications import record
 
+pytestmark = pytest.mark.ci
+
 SETTINGS = {"library": "polynomial", "degree": 1, "max_terms": 2, "certificate": 0, "average": 1}
 
 

@@ -154,6 +154,7 @@ def test_every_path_gives_the_outputs_of_the_search(steps, average, path, tmp_pa
     np.testing.assert_allclose(path(model, measured_record(), tmp_path), expected, rtol=1e-9)
 
 
+@pytest.mark.ci
 def test_a_coupled_fit_of_deviations_simulates_the_measured_record() -> None:
     prepared = measured_record().map(lambda each: preprocess(each, detrend="constant"))
     result = islands.fit(prepared, validation=0.25, max_terms=3, certificate=0)
