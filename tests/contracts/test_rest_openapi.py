@@ -193,6 +193,7 @@ def test_responses_of_other_requests_match_the_documentation(service, document):
     assert check_response(document, ended).status_code == 204
 
 
+@pytest.mark.ci
 def test_a_model_equals_its_entry_in_the_result(service, finished):
     result = service.client.get(f"/v1/jobs/{finished}/result").json()
     models = service.client.get(f"/v1/jobs/{finished}/models").json()["items"]

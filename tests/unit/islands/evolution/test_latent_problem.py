@@ -33,6 +33,7 @@ def test_the_number_of_threads_does_not_matter(problem, archipelagos):
     assert evolution.step(island) == problem.open(threads=3).step(island)
 
 
+@pytest.mark.ci
 def test_a_search_that_continues_has_the_same_islands(problem, archipelagos):
     continued = SerialEngine().run(problem, archipelagos[1], never_stop)
     assert [each.archipelago for each in continued] == archipelagos[2:]

@@ -123,6 +123,7 @@ def test_equal_arguments_give_equal_bits(result):
     ]
 
 
+@pytest.mark.ci
 def test_validation_record_does_not_affect_the_parameters_of_a_structure():
     whole = islands.fit(tank(), validation=tank(150, seed=5), library="polynomial", max_terms=3)
     other = islands.fit(tank(), validation=tank(150, seed=6), library="polynomial", max_terms=3)

@@ -49,6 +49,7 @@ def test_identify_estimates_all_models_with_the_chosen_estimator(estimator):
         np.testing.assert_allclose(entry.model.theta, expected.model.theta, rtol=1e-9)
 
 
+@pytest.mark.ci
 def test_bias_of_least_squares_is_reported_for_a_model_of_a_result():
     found = {}
     for noise in ("equation", "output"):

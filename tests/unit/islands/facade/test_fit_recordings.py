@@ -38,6 +38,7 @@ def test_several_recordings_are_fitted_together():
     check_law(made)
 
 
+@pytest.mark.ci
 def test_a_law_is_found_in_a_record_with_missing_outputs():
     y = tank().y.copy()
     y[[3, 50, 51, 52, 120, 200, 350, 361]] = np.nan

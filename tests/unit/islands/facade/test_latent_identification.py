@@ -114,6 +114,7 @@ def test_units_of_the_record_do_not_matter():
     assert runs[1] == pytest.approx(1e-6 * runs[0] - 2.0, abs=1e-10)
 
 
+@pytest.mark.ci
 def test_a_record_that_is_too_short_has_no_models():
     with pytest.raises(RecordError, match="take a longer recording"):
         identify(spring_record(16))

@@ -15,6 +15,7 @@ def result(tmp_path):
     return islands.fit(record(300), **search).save(tmp_path / "result", figures=())
 
 
+@pytest.mark.ci
 def test_the_model_of_a_result_is_the_recommended_one(result):
     assert read_saved_model(open_document(result)) == islands.load(result).best.model
     document = json.loads((result / "result.json").read_text())

@@ -26,6 +26,7 @@ OUTPUTS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("make", OUTPUTS.values(), ids=OUTPUTS)
 def test_a_masked_output_is_missing(make):
     assert np.flatnonzero(np.isnan(make().y)).tolist() == [20, 41]

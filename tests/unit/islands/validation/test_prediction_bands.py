@@ -26,6 +26,7 @@ def result(noise=0.02, scale=1.0):
     return islands.fit(record(noise, scale=scale), library="polynomial", degree=2, lags=2, max_terms=4)
 
 
+@pytest.mark.ci
 def test_a_band_contains_its_free_run():
     data = record(seed=1)
     for model in result().models:

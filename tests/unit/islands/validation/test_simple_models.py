@@ -31,6 +31,7 @@ def sentences(document):
     return {line.partition(":")[0]: line for line in describe(document)}
 
 
+@pytest.mark.ci
 def test_a_linear_law_is_recommended_as_linear_and_a_curve_is_not(curved):
     straight = islands.fit(record(0.0), **SETTINGS)
     assert is_linear(straight.best.model)
@@ -40,6 +41,7 @@ def test_a_linear_law_is_recommended_as_linear_and_a_curve_is_not(curved):
     assert "latent" in kinds
 
 
+@pytest.mark.ci
 def test_a_step_alone_shows_a_linear_law():
     """The validation data have no excitation: every model of the level is as good there."""
     rng, u = np.random.default_rng(1), np.where(np.arange(400) < 20, 0.0, 1.0)

@@ -10,6 +10,7 @@ def record(tmp_path_factory):
     return write_hysteresis(tmp_path_factory.mktemp("inspect") / "record.csv")
 
 
+@pytest.mark.ci
 def test_json_is_the_document(record):
     document = json.loads(succeed("inspect", record, "--json"))
     assert document["choice"]["output"] == "y_um"

@@ -45,6 +45,7 @@ def test_options_of_a_figure_without_the_others_are_refused(model, command_line,
     assert message in error
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("options", [(), ("--out", "mine.html")])
 def test_report_of_a_folder_is_written_into_it_or_where_it_is_asked_for(command_line, tmp_path, options):
     settings = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 1, "certificate": 0}

@@ -9,6 +9,7 @@ from islands.records.writer import write_record
 from support.identifications import record as make_record
 
 
+@pytest.mark.ci
 def test_the_error_on_a_record_is_compared_with_that_on_the_validation_data(command_line, tmp_path):
     record = make_record(300)
     write_record(record, tmp_path / "r.csv")

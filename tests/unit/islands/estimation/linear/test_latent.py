@@ -35,6 +35,7 @@ def found():
     return record, identify_linear_model(record)
 
 
+@pytest.mark.ci
 def test_the_latent_model_is_the_identified_one(found):
     record, model = found
     linear = identify_linear(record.u, record.y, record.dt, record.segments)

@@ -111,6 +111,7 @@ def test_a_statement_about_the_signals_is_one_about_their_zero():
     assert not any(find_offsets(record, "odd"))
 
 
+@pytest.mark.ci
 def test_the_constant_of_an_offset_is_no_term_of_the_law():
     """A law of two terms has two terms in every unit: the zero of the unit adds the constant."""
     y = simulate(lambda y, u, k: 0.8 * y[k - 1] + 0.3 * u[k - 1])

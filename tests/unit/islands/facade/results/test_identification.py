@@ -11,6 +11,7 @@ from support.searches import record
 from support.undrawn import undrawn_figures
 
 
+@pytest.mark.ci
 def test_a_result_without_a_loop_replaces_the_loop_figure_of_an_earlier_one(result, tmp_path):
     figures = tmp_path / "figures"
     figures.mkdir()

@@ -15,6 +15,7 @@ from islands.models.narx import make_model
 from support.block_cases import OF_BLOCKS
 
 
+@pytest.mark.ci
 def test_a_response_is_drawn_into_the_axes_of_the_user(result):
     from matplotlib.figure import Figure
 

@@ -15,6 +15,7 @@ def stored(folder):
     return read_result(folder)
 
 
+@pytest.mark.ci
 def test_a_folder_gives_the_models_errors_and_settings_of_the_result(result, stored):
     assert [each.model for each in stored.models] == [each.model for each in result.models]
     assert [each.metrics for each in stored.models] == [each.metrics for each in result.models]

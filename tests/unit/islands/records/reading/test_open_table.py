@@ -66,6 +66,7 @@ def test_a_code_in_an_input_is_refused_without_gaps(tmp_path):
     assert read_record(tmp_path / "bad.csv", ["u"], "y", outliers="keep").u.min() == -9999
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("values", "errors"),
     [((-50, -50, 60), "3 isolated spikes"), (-9999, "3 times -9999, a code of missing values")],

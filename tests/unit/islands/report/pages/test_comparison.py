@@ -39,6 +39,7 @@ def headline(page):
     return re.search("<h1>(.*?)</h1>", page)[1]
 
 
+@pytest.mark.ci
 def test_models_of_different_data_have_separate_figures_and_no_best_one(document):
     other = {**RUN, "measured": [5.0, 6.0, 7.0]}
     page = write(compared(document), compared(document, name="second", run=other))

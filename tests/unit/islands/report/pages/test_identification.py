@@ -28,6 +28,7 @@ def write(found, figures=FIGURES, **changes):
     ).decode()
 
 
+@pytest.mark.ci
 def test_names_of_columns_are_text(found):
     document = result_document(found.search_result)
     names = {"inputs": ["<u>"], "output": "<script>"}

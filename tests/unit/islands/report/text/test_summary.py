@@ -126,6 +126,7 @@ def test_noise_of_the_output_is_a_reason_for_the_free_run_estimate(findings):
     assert "estimator=" not in str(linear)
 
 
+@pytest.mark.ci
 def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(findings):
     data = two_inputs(seed=0)
     named = Dataset(data.u, data.y, 0.01, ("heat_W", "valve"), "T_K", ("W", ""), "K")
@@ -142,6 +143,7 @@ def test_an_empty_estimator_is_named_in_the_settings(findings):
     assert "own_primitives" not in method_text(chosen)
 
 
+@pytest.mark.ci
 def test_advice_about_a_saturated_output_names_the_class_of_models_with_a_limit():
     data = make_noisy_record("output", 1, 400)
     limit = float(np.quantile(data.y, 0.9))
@@ -186,6 +188,7 @@ def test_only_the_recommended_model_has_a_mark(findings):
     assert [row[0].strip(" *") for row in rows(facts_of(findings))] == ["1", "2", "3", "4"]
 
 
+@pytest.mark.ci
 def test_columns_of_hysteresis_need_a_model_that_claims_it(findings):
     plain = islands.fit(record(300), library="polynomial", degree=1, max_terms=2).search_result
     assert not any(entry.physics.property_1 for entry in plain.models)
