@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from islands.errors import RecordError
 from islands.estimation.balanced_form import find_balanced_form
 from islands.estimation.constraints.state_space import take_system
 from islands.estimation.constraints.static_state import StateSpaceParameters
@@ -95,7 +96,12 @@ def fit_linear_systems(record: Dataset, data: LatentData, steps: Steps) -> list[
     StoppedError
         A stop is requested.
     """
-    models = identify_linear_models(record, steps)
+    try:
+        # A fit of the same record has identified these models already.
+        models = identify_linear_models(record, steps)
+    except RecordError:
+        # The output may follow an input within the sample.
+        models = identify_linear_models(data.record, steps)
     drafts = [
         _begin(model, delays, data)
         for model in sorted(models, key=lambda model: model.order)

@@ -271,6 +271,7 @@ class Search:
         if self.high is not None:
             response = sample_high_order(self.signals, self.high)
             small = list(reduce_model(response, range(2, min(_GROUP, self.max_order) + 1)))
+            self.steps.check("linear models of several orders")
             # Many modes are a sum, whose zeros are all free.
             large = list(reduce_model(response, range(_GROUP + 1, self.max_order + 1), excess=1))
             self._keep_reduced(small)
@@ -299,6 +300,7 @@ class Search:
             coloured = [project(self.signals, replace(start, noise=noise)) for start in starts]
             fits += [each for each in coloured if each]
         for steps in _HALVINGS:
+            self.steps.check("linear models of several orders")
             fits = [minimise(self.signals, each, steps, 1e-2) for each in fits]
             fits = sorted(fits, key=attrgetter("criterion"))[: max(len(fits) // 2, _KEPT)]
         for fit in fits[:_KEPT]:
@@ -503,6 +505,7 @@ class Search:
         """Return fits with a few dead times of every input, one after the other from the best one so far."""
         every = [fit]
         for output, place in np.ndindex(fit.structure.delays.shape):
+            self.steps.check("dead times of a linear model")
             best = min(every, key=attrgetter("deviance"))
             found = [self._with_delay(best, output, place, delay) for delay in _COARSE]
             every += [each for each in found if each is not None]
@@ -521,6 +524,7 @@ class Search:
         improved = True
         while improved:
             improved = False
+            self.steps.check("dead times of a linear model")
             for output, place in np.ndindex(fit.structure.delays.shape):
                 for change in _CHANGES:
                     delay = int(fit.structure.delays[output, place]) + change

@@ -124,7 +124,7 @@ def choose_kind(
     """Choose the kind of a record.
 
     The recommended models with terms of the kinds are compared as `recommend` compares the models of a
-    search: the smallest without a significantly larger error counts, of equal sizes that of the first kind.
+    search: the simplest with as much evidence as the best counts, of equal sizes that of the first kind.
     Hysteresis is chosen within 25 % of the least error if the output rests while the inputs rest. If dead
     times were estimated, models of the chosen kind without them are compared with those that have them in
     the same way.
@@ -317,7 +317,7 @@ def _recommend_kind(
     best = recommend(sizes, models, False)
     kind = kinds[best.rank - 1]
     is_least = errors[kind] == min(errors.values()) or best.rank == best.reference
-    smallest = "" if is_least else ", the smallest without a significantly larger error,"
+    smallest = "" if is_least else ", the simplest with as much evidence,"
     left_out = [
         f"{' and '.join(kinds[rank - 1] for rank in each.ranks)} {describe_exclusion(each, models)}"
         for each in list_rivals(best, sizes, models)

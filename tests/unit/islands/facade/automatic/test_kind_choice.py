@@ -123,4 +123,3 @@ def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
     kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors, 1)
     assert kind == "smooth"
     assert "left out" not in reason
-    assert "model, the smallest without a significantly larger error, on" in reason
