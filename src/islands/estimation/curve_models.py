@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from islands.estimation.fitted_state_space import Draft, FittedStateSpace
+from islands.estimation.fitted_state_space import Draft, FittedStateSpace, NewUnit
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front, fit_linear_systems, make_odd
-from islands.models.latent import LatentModel, StateSpaceLayout
+from islands.models.latent import LatentModel
 from islands.models.unit_functions import FUNCTIONS, parse_unit
 from islands.parallel import map_over_record
 from islands.progress import Steps
@@ -143,15 +143,8 @@ def _list_drafts(system: FittedStateSpace, data: LatentData) -> Iterator[Draft]:
 def _append_curve(draft: Draft, function: str, weights: NDArray[np.float64], offset: float) -> Draft:
     """Return a draft with a curve that has no effect yet, and whose argument keeps its kind of signal."""
     order, inputs = draft.layout.order, draft.layout.inputs
-    layout = StateSpaceLayout(order, inputs, 1)
-    theta, free = np.zeros(len(layout.names)), np.ones(len(layout.names), bool)
-    for values, of_draft in ((theta, draft.theta), (free, draft.free)):
-        known = draft.layout.split(of_draft)
-        for name, block in layout.split(values).items():
-            if name not in "EFWs":
-                block[...] = known[name]
-    blocks = layout.split(theta)
-    blocks["W"][0], blocks["s"][0] = weights, offset
     reads_states = bool(weights[:order].any())
-    layout.split(free)["W"][0] = np.repeat([reads_states, not reads_states], [order, inputs])
-    return replace(draft, layout=layout, units=(function,), theta=theta, free=free)
+    values = {"E": np.zeros(order), "F": np.zeros(1), "W": weights, "s": np.array([offset])}
+    free = {name: np.ones(each.size, bool) for name, each in values.items()}
+    free["W"] = np.repeat([reads_states, not reads_states], [order, inputs])
+    return draft.append([NewUnit(function, values, free)])

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,17 @@ from islands.models.latent import ZERO_BLOCKS, StateSpaceLayout, reads_at_once
 from islands.models.unit_functions import find_codes, parse_unit
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes
+
+#: Entries of matrices by name, as of `StateSpaceLayout.split`.
+Blocks = dict[str, NDArray[Any]]
+
+
+class NewUnit(NamedTuple):
+    """A unit that a draft lacks: its entries of the blocks E, F, W and s, and which of them are free."""
+
+    function: str
+    values: Blocks
+    free: Blocks
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +155,16 @@ class Draft:
             delays=self.delays,
         )
 
+    def append(self, units: Sequence[NewUnit]) -> "Draft":
+        """Return the draft with further units."""
+        blocks, free = self.layout.split(self.theta), self.layout.split(self.free)
+        for unit in units:
+            blocks, free = _append(blocks, unit.values), _append(free, unit.free)
+        layout = replace(self.layout, units=len(self.units) + len(units))
+        functions = (*self.units, *(unit.function for unit in units))
+        theta, used = layout.join(blocks), layout.join(free)
+        return replace(self, layout=layout, units=functions, theta=theta, free=used)
+
     def restrict(self, structure: str) -> "Draft":
         """Return the draft with the zeros of a structure, an entry of ``ZERO_BLOCKS``."""
         free = self.free.copy()
@@ -195,6 +216,17 @@ class Draft:
             fit.mean_square,
             self.delays,
         )
+
+
+def _append(blocks: Blocks, entries: Blocks) -> Blocks:
+    """Return the blocks with the entries of a further unit."""
+    return {
+        **blocks,
+        "E": np.column_stack([blocks["E"], entries["E"]]),
+        "F": np.append(blocks["F"], entries["F"]),
+        "W": np.vstack([blocks["W"], entries["W"]]),
+        "s": np.append(blocks["s"], entries["s"]),
+    }
 
 
 def number(free: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -8,16 +8,15 @@ zero, disturbs the arguments of the units, or continues the estimation.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from islands.estimation.fitted_state_space import Draft, FittedStateSpace
+from islands.estimation.fitted_state_space import Draft, FittedStateSpace, NewUnit
 from islands.estimation.latent_data import LatentData
 from islands.kernels.state_space import simulate_states
-from islands.models.latent import StateSpaceLayout
 from islands.models.unit_functions import (
     ARGUMENT,
     FUNCTIONS,
@@ -51,9 +50,6 @@ _POLES, _COUPLING = (0.3, 0.9995), 1e-3
 
 #: Rows of a block on which the states of two systems are compared, at most.
 _COMPARED_ROWS = 1_500
-
-#: Entries of matrices by name, as of `StateSpaceLayout.split`.
-Blocks = dict[str, NDArray[Any]]
 
 
 def begin_system(linear: FittedStateSpace, units: Sequence[str], structure: str, rng: Generator) -> Draft:
@@ -90,7 +86,7 @@ def cross(
     read = np.repeat([used[: other.order].any(), used[other.order :].any()], [system.order, other.inputs])
     moved = np.full(system.order, free["E"][:, unit].any())
     is_free = {"E": moved, "F": free["F"][[unit]], "W": read, "s": np.ones(1, bool)}
-    unit_of_other = _NewUnit(other.units[unit], values, is_free)
+    unit_of_other = NewUnit(other.units[unit], values, is_free)
     return _append_units(system.draft(), [unit_of_other]).restrict(structure)
 
 
@@ -114,15 +110,7 @@ def _simulate_states(system: FittedStateSpace, data: LatentData) -> NDArray[np.f
     return np.concatenate(found)
 
 
-class _NewUnit(NamedTuple):
-    """A unit that a draft lacks: its entries of the blocks, and which of them are free."""
-
-    function: str
-    values: Blocks
-    free: Blocks
-
-
-def _draw_unit(system: FittedStateSpace, function: str, rng: Generator) -> _NewUnit:
+def _draw_unit(system: FittedStateSpace, function: str, rng: Generator) -> NewUnit:
     order, width = system.order, system.order + system.inputs
     values = {
         "E": _EFFECT * rng.standard_normal(order),
@@ -130,46 +118,17 @@ def _draw_unit(system: FittedStateSpace, function: str, rng: Generator) -> _NewU
         "W": rng.standard_normal(width) / np.sqrt(width),
         "s": _OFFSET * rng.standard_normal(1),
     }
-    return _NewUnit(function, values, {name: np.ones(each.size, bool) for name, each in values.items()})
+    return NewUnit(function, values, {name: np.ones(each.size, bool) for name, each in values.items()})
 
 
-def _append_units(draft: Draft, units: Sequence[_NewUnit]) -> Draft:
+def _append_units(draft: Draft, units: Sequence[NewUnit]) -> Draft:
     """Return a draft with further units, the effects of which are estimated first."""
-    blocks, free = draft.layout.split(draft.theta), draft.layout.split(draft.free)
-    for unit in units:
-        blocks, free = _append(blocks, unit.values), _append(free, unit.free)
-    functions = (*draft.units, *(unit.function for unit in units))
-    return _join(draft, [blocks, free], functions, draft.states, EFFECT_STEPS)
-
-
-def _append(blocks: Blocks, entries: Blocks) -> Blocks:
-    """Return the blocks with the entries of a further unit."""
-    return {
-        **blocks,
-        "E": np.column_stack([blocks["E"], entries["E"]]),
-        "F": np.append(blocks["F"], entries["F"]),
-        "W": np.vstack([blocks["W"], entries["W"]]),
-        "s": np.append(blocks["s"], entries["s"]),
-    }
+    return replace(draft.append(units), steps=STEPS, effect_steps=EFFECT_STEPS)
 
 
 def _take(draft: Draft, states: Sequence[int], units: Sequence[int], effect_steps: int) -> Draft:
     """Return a draft with some of the states and units only."""
     return replace(draft.take(states, units), steps=STEPS, effect_steps=effect_steps if units else 0)
-
-
-def _join(
-    draft: Draft,
-    parts: Sequence[Blocks],
-    units: tuple[str, ...],
-    states: NDArray[np.float64],
-    effect_steps: int,
-) -> Draft:
-    """Return the draft of the blocks of its values and of its free parameters."""
-    layout = StateSpaceLayout(states.shape[1], draft.layout.inputs, len(units))
-    theta, free = (np.concatenate([blocks[name].ravel() for name in layout.blocks]) for blocks in parts)
-    first = effect_steps if units else 0
-    return Draft(layout, units, theta, free.astype(bool), states, STEPS, first, draft.delays)
 
 
 def _add_unit(system: FittedStateSpace, rng: Generator) -> Draft | None:
@@ -223,7 +182,9 @@ def _add_state(system: FittedStateSpace, rng: Generator) -> Draft | None:
         "o": np.append(free["o"], True),
     }
     states = np.column_stack([draft.states, np.zeros(len(draft.states))])
-    return _join(draft, [{**blocks, **value}, {**free, **is_free}], draft.units, states, 0)
+    layout = replace(draft.layout, order=order + 1)
+    theta, used = layout.join({**blocks, **value}), layout.join({**free, **is_free})
+    return replace(draft, layout=layout, theta=theta, free=used, states=states, steps=STEPS)
 
 
 def _remove_state(system: FittedStateSpace, rng: Generator) -> Draft | None:

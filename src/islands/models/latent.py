@@ -122,6 +122,10 @@ class StateSpaceLayout:
             at += size
         return found
 
+    def join(self, blocks: Mapping[str, NDArray[_Entry]]) -> NDArray[_Entry]:
+        """Return a value for each parameter from the entries of each matrix, as `split` returns them."""
+        return np.concatenate([blocks[name].ravel() for name in self.blocks])
+
     def find_matrices(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Return views of the parameters by name, as in the equations, with the weights W and V apart.
 
