@@ -300,9 +300,9 @@ def ignore_result(_found: SearchResult, /) -> None:
 
 
 def list_simple_models(
-    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
+    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps, *, curves: bool = False
 ) -> list[Assessment]:
-    """Return the linear model of the data of a search, and those with one curve, which are among its models.
+    """Return the linear model of the data of a search, which is one of its models; empty without one.
 
     Parameters
     ----------
@@ -310,30 +310,17 @@ def list_simple_models(
         As for `assess_linear_model`.
     steps : Steps
         Each identification is an optional step.
+    curves : bool
+        Whether linear models with one curve follow.
     """
-    return [
-        *list_linear_models(split, shooting, warm_up, constraints, steps),
-        *list_curve_models(split, shooting, warm_up, constraints, steps),
-    ]
-
-
-def list_linear_models(
-    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
-) -> list[Assessment]:
-    """Return the linear model of the data of a search, which is one of its models; empty without one."""
+    parts = split, shooting, warm_up, constraints, steps
     steps.report(LINEAR_MODEL, None)
-    compute = partial(assess_linear_model, split, shooting, warm_up, constraints, steps)
-    found = steps.attempt(LINEAR_MODEL, compute)
-    return [found] if found else []
-
-
-def list_curve_models(
-    split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
-) -> list[Assessment]:
-    """Return linear models with one curve; empty without one."""
-    steps.report(CURVE_MODELS, None)
-    compute = partial(assess_curve_models, split, shooting, warm_up, constraints, steps)
-    return steps.attempt(CURVE_MODELS, compute) or []
+    linear = steps.attempt(LINEAR_MODEL, partial(assess_linear_model, *parts))
+    found = [linear] if linear else []
+    if curves:
+        steps.report(CURVE_MODELS, None)
+        found += steps.attempt(CURVE_MODELS, partial(assess_curve_models, *parts)) or []
+    return found
 
 
 def as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:

@@ -13,7 +13,7 @@ from islands.evolution.search_result import (
     SearchStatistics,
     as_candidate,
     ignore_result,
-    list_linear_models,
+    list_simple_models,
     rank_models,
     with_bands,
 )
@@ -99,7 +99,7 @@ def fit_class(
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
     counts = {"ok": len(models)}
     search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
-    assessed += list_linear_models(split, interval, 0, "none", steps)
+    assessed += list_simple_models(split, interval, 0, "none", steps)
     result = SearchResult(record, split, seed, settings, search, rank_models(assessed))
     on_models(result)
     validated = [as_candidate(entry) for entry in assessed]

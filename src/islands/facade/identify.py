@@ -27,7 +27,6 @@ from islands.evolution.search_result import (
     SearchStatistics,
     as_candidate,
     ignore_result,
-    list_linear_models,
     list_simple_models,
     rank_models,
     with_average,
@@ -300,8 +299,8 @@ def _list_simple_models(split: Split, settings: Settings, steps: Steps, *, chose
     """
     if settings.select == "fitness" or settings.estimator not in ("", "free-run"):
         return []
-    list_models = list_simple_models if chosen else list_linear_models
-    return list_models(split, settings.shooting, settings.maximum_lag, settings.constraints, steps)
+    limits = settings.shooting, settings.maximum_lag, settings.constraints
+    return list_simple_models(split, *limits, steps, curves=chosen)
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:

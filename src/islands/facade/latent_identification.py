@@ -18,7 +18,7 @@ from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
     as_candidate,
-    list_linear_models,
+    list_simple_models,
     rank_models,
     with_bands,
 )
@@ -107,7 +107,7 @@ def search_latent(
         assess(model, split, interval, constraints=settings.constraints, criterion=_CRITERION)
         for model in models
     ]
-    assessed += list_linear_models(split, interval, 0, settings.constraints, steps)
+    assessed += list_simple_models(split, interval, 0, settings.constraints, steps)
     described |= {name: getattr(settings, name) for name in sorted(LATENT_SETTINGS)}
     described |= {"average": 1, "shooting": interval}
     search = SearchStatistics(

@@ -37,7 +37,6 @@ from islands.evolution.search_result import (
     SearchStatistics,
     as_candidate,
     keep_best_of_sizes,
-    list_linear_models,
     list_simple_models,
     rank_models,
     state_steps,
@@ -254,8 +253,8 @@ def fit_library(
         models += refined
     if settings.selecting_estimator in _SIMULATING:
         # A library that the user names has no models of another kind, besides the linear one.
-        list_models = list_simple_models if settings.library == AUTO else list_linear_models
-        simple = list_models(split, interval, warm_up, library.constraints, steps)
+        limits = interval, warm_up, library.constraints
+        simple = list_simple_models(split, *limits, steps, curves=settings.library == AUTO)
         result = replace(result, models=rank_models([*result.models, *simple]))
         models += simple
     estimates = [as_candidate(entry) for entry in models]

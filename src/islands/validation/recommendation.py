@@ -17,7 +17,7 @@ therefore choose among models that the data do not distinguish. Property 1 is a 
 The setting ``select`` can replace this rule by the paper's choice of Appendix A: the least training error.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, isnan, log
 from typing import TypeAlias
@@ -162,11 +162,7 @@ def recommend(
     limit = lack[reference] + DECISIVE
     selection.keep(EVIDENCE, [at for at in selection.left if lack[at] <= limit])
     selection.keep(CHECKS, [at for at in selection.left if is_sound(assessments[at].physics, hysteresis)])
-
-    def order(at: int) -> tuple[bool, float, float, int]:
-        return not is_linear(assessments[at].model), sizes[at], lack[at], at
-
-    chosen = min(selection.left, key=order)
+    chosen = _take_simplest(selection.left, sizes, assessments, lack)
     found = Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
     reasons = (
         _describe_choice(found, sizes, assessments, unit),
@@ -196,7 +192,17 @@ def recommend_joint(
     lack = _measure_lack(bounded, sizes, assessments, terms)
     limit = min(lack.values()) + DECISIVE
     equal = [at for at in bounded if lack[at] <= limit]
-    return assessments[min(equal, key=lambda at: (not is_linear(assessments[at].model), sizes[at], lack[at]))]
+    return assessments[_take_simplest(equal, sizes, assessments, lack)]
+
+
+def _take_simplest(
+    places: Sequence[int],
+    sizes: Sequence[float],
+    assessments: Sequence[Comparable],
+    lack: Mapping[int, float],
+) -> int:
+    """Return the linear one of models with as much evidence, or the smallest."""
+    return min(places, key=lambda at: (not is_linear(assessments[at].model), sizes[at], lack[at], at))
 
 
 def _measure_lack(
