@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from time import process_time
 
@@ -15,11 +16,12 @@ from islands.systems.catalogue import make_record
 from support.levels import nightly_but
 
 #: Seconds of CPU between two calls. Two seconds are promised; slower machines and the saving need the rest.
-LONGEST = 1.5
+LONGEST = 1.0
 
 SEARCH = {"population": 40, "generations": 4, "max_terms": 4, "initial_terms": (1, 4), "max_height": 4}
 
 
+@cache
 def record(samples: int) -> Dataset:
     whole = make_record("bouc-wen-piezo", "authors", "estimation")
     return Dataset(whole.u[:samples], whole.y[:samples], whole.dt)
@@ -41,7 +43,8 @@ RUNS: dict[str, Callable[[int, Stop], object]] = {
 
 @pytest.mark.ci
 @pytest.mark.parametrize("name", nightly_but(("fit", "identify of several outputs"), RUNS))
-def test_stop_function_is_called_often(name: str) -> None:
+def test_stop_function_is_called_at_least_every_second(name: str) -> None:
+    record(3000)  # the simulation of the record is no part of the computation
     calls = [process_time()]
 
     def stop() -> bool:
