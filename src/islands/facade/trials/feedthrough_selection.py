@@ -1,5 +1,7 @@
 """Choice of inputs with direct feedthrough, which the model reads at sample k."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from islands.errors import RecordError
@@ -45,21 +47,23 @@ def select_feedthrough(split: Split, feedthrough: str, library: TrialLibrary) ->
     if feedthrough == "no" or not measured:
         return split
     if feedthrough == "yes":
-        return _advance(split, measured)
+        return _advance(split, tuple(measured))
     # Statistics of very large numbers overflow: no input of such a record is advanced.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = [place for place in find_direct_inputs(split.estimation) if place in measured]
         if found:
-            advanced = _advance(split, found)
+            advanced = _advance(split, tuple(found))
             return advanced if _error(advanced, library) <= LARGEST_RATIO * _error(split, library) else split
         found = [place for place in find_linear_paths(split.estimation) if place in measured]
         if not found or find_feedback(split.estimation).value:
             return split
-        advanced = _advance(split, found)
+        advanced = _advance(split, tuple(found))
         return advanced if _linear_error(advanced) <= LARGEST_RATIO * _linear_error(split) else split
 
 
-def _advance(split: Split, places: list[int]) -> Split:
+# The fits of all libraries share what is identified of the advanced record.
+@lru_cache(maxsize=2)
+def _advance(split: Split, places: tuple[int, ...]) -> Split:
     return Split(advance_inputs(split.estimation, places), advance_inputs(split.validation, places))
 
 
