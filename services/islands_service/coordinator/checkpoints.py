@@ -14,7 +14,7 @@ from islands.diagnosis.calibration.fit_journal import FitJournal, journal_from_d
 from islands.diagnosis.result import Diagnosis
 from islands.errors import IslandsError, ModelError
 from islands.evolution.search_state import SearchState
-from islands.facade.automatic.kind_choice import Choice, choice_from_document
+from islands.facade.automatic.choice import Choice, choice_from_document
 from islands.persistence.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
@@ -193,7 +193,7 @@ class JobCheckpoints(CheckpointBlobs):
         about: dict[str, Any] = {
             "job": self._job.id,
             "wall_s": spent,
-            "choice": None if choice is None else choice.to_document(),
+            "choice": None if choice is None else choice.to_checkpoint(),
             **state_document(state),
         }
         return self.save(compressed_checkpoint(state.archipelago, about))

@@ -16,7 +16,8 @@ from islands.evolution.presets import AUTO
 from islands.evolution.search_result import AnySearchResult, without_optional_steps
 from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError
+from islands.facade.automatic.choice import Choice
+from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.fit import fit_record
 from islands.facade.identification_progress import SEARCH, IdentificationProgress, class_phases

@@ -123,6 +123,22 @@ LATENT_SETTINGS = frozenset(
     }
 )
 
+#: Settings with which the models of fits may compete with those of a search: its effort, and settings that a
+#: fit has as well. Any other one says what a model is, or how it is selected.
+_COMPETING_SETTINGS = (LATENT_SETTINGS - {"structure", "model_class"}) | {
+    *("average", "feedthrough", "shooting", "max_terms", "initial_terms", "swap_search", "from_library"),
+    *(
+        "library",
+        "library_degree",
+        "library_lags",
+        "library_delays",
+        "mutation",
+        "prune",
+        "outer",
+        "distinct",
+    ),
+}
+
 #: Preset that is chosen among `KINDS` by trials on the record. It is the default of all commands.
 AUTO = "auto"
 
@@ -216,6 +232,11 @@ def resolve_latent(changes: Mapping[str, Any]) -> Settings | None:
     """
     common = LATENT_SETTINGS - {"structure", "constraints"}
     return resolve_settings(LATENT, changes) if common.issuperset(changes) else None
+
+
+def accepts_fits(changes: Mapping[str, Any]) -> bool:
+    """Return whether models of fits meet the settings of a search with these changes of its preset."""
+    return _COMPETING_SETTINGS.issuperset(changes)
 
 
 def list_structures(preset: str) -> tuple[str, ...]:

@@ -10,13 +10,16 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from islands.errors import ModelError
+from islands.estimation.quantity_errors import with_quantity_errors
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.search_state import HistoryPoint
 from islands.evolution.settings import FITNESS_MODES
 from islands.expressions.printing import plain_factor
 from islands.models.equations import equation
+from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
+from islands.parallel import map_over_record
 from islands.progress import Steps
 from islands.records.averaging import count_means
 from islands.records.channel_names import parse_channel_name
@@ -31,6 +34,7 @@ from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import (
     Recommendation,
     is_linear,
+    is_sound,
     measure_size,
     recommend,
     recommend_fittest,
@@ -42,6 +46,9 @@ FoundT = TypeVar("FoundT", bound="SearchResult | CoupledSearchResult")
 
 #: Name of the step that makes the ensemble and the prediction bands.
 BANDS = "prediction bands"
+
+#: Name of the step that estimates standard errors.
+_ERRORS = "standard errors"
 
 #: Name of the step that identifies the linear model of the same data.
 LINEAR_MODEL = "linear model"
@@ -323,28 +330,43 @@ def list_simple_models(
     return found
 
 
+def add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResult:
+    """Return a search result with further models of the same data; see `keep_best_of_sizes`."""
+    return replace(found, models=keep_best_of_sizes([*found.models, *models]))
+
+
 def as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
     """Return an assessed model that was estimated as a candidate of an ensemble."""
     assert entry.criterion is not None, "the models of a search are estimated"
     return ValidatedModel(entry.model, entry.criterion, entry.metrics["validation"]["free_run"].rmse ** 2)
 
 
-def with_bands(
-    found: SearchResult,
-    candidates: Sequence[ValidatedModel[DynamicModel]],
-    constraints: str,
-    warm_up: int,
-    steps: Steps,
+def complete_search(
+    found: SearchResult, candidates: Sequence[ValidatedModel[DynamicModel]], steps: Steps
 ) -> SearchResult:
-    """Return a search result with the ensemble of the candidates and with calibrated bands of its models.
+    """Return a search result with standard errors of its quantities and calibrated prediction bands.
 
-    Without them once a stop is requested, or if they fail. The result states the steps that it lacks.
+    Without them once a stop is requested, or if they fail. The result states the steps that it lacks, and its
+    models the number of samples of a mean.
+
+    Parameters
+    ----------
+    found : SearchResult
+        At the rate of its data.
+    candidates : sequence of ValidatedModel
+        All models that were estimated; they give the ensemble.
+    steps : Steps
     """
+    constraints, data = str(found.settings["constraints"]), found.split.estimation
+    add = partial(_add_errors, record=data, constraints=constraints)
+    models = steps.attempt(_ERRORS, lambda: tuple(map_over_record(add, found.models, data.samples)))
+    found = found if models is None else replace(found, models=models)
     steps.report(BANDS, 1.0)
     skip = partial(steps.skip, BANDS)
 
     def compute() -> SearchResult:
         recommended = found.recommended.model
+        warm_up = max(entry.warm_up for entry in found.models)
         ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed, skip, recommended)
         if skip() or ensemble is None:
             return found
@@ -353,7 +375,14 @@ def with_bands(
         banded = tuple(replace(entry, bands=bands) for entry, bands in models)
         return replace(found, models=banded, ensemble=ensemble)
 
-    return state_steps(steps.attempt(BANDS, compute) or found, steps)
+    return with_average(state_steps(steps.attempt(BANDS, compute) or found, steps), found.average)
+
+
+def _add_errors(entry: Assessment, record: Dataset, constraints: str) -> Assessment:
+    model = entry.model
+    if not isinstance(model, LatentModel) or model.quantity_errors is not None:
+        return entry
+    return replace(entry, model=with_quantity_errors(model, record, entry.warm_up, constraints))
 
 
 def state_steps(found: FoundT, steps: Steps) -> FoundT:
@@ -401,11 +430,21 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
 
 
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
-    """Return the best model of every size, best first; see `rank_models`."""
-    best: dict[int, Assessment] = {}
-    for entry in rank_models(models):
-        best.setdefault(entry.model.size, entry)
-    return tuple(best.values())
+    """Return the models with the most evidence of every class and size, best first; see `rank_models`.
+
+    Of one size, the least error of the free run on all data is the most evidence. If the best model fails the
+    physics checks, the best one of those that pass them is kept as well, as in a recommendation.
+    """
+    groups: dict[tuple[str, bool, int], list[Assessment]] = {}
+    for entry in sorted(rank_models(models), key=lambda each: each.mean_square):
+        kind = entry.model.kind, is_linear(entry.model) and isinstance(entry.model, LatentModel)
+        groups.setdefault((*kind, entry.model.free_size), []).append(entry)
+    kept = []
+    for group in groups.values():
+        kept.append(group[0])
+        if not is_sound(group[0].physics, hysteresis=False):
+            kept += [each for each in group if is_sound(each.physics, hysteresis=False)][:1]
+    return rank_models(kept)
 
 
 def _ranking_key(entry: Assessment) -> tuple[bool, float, int, str]:

@@ -11,18 +11,20 @@ from islands.evolution.search_result import (
     ResultCallback,
     SearchResult,
     SearchStatistics,
+    add_models,
     as_candidate,
+    complete_search,
     ignore_result,
     list_simple_models,
     rank_models,
-    with_bands,
 )
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.fit_settings import FitSettings
 from islands.facade.identification_progress import SEARCH
-from islands.facade.latent_identification import complete_latent, search_latent
+from islands.facade.latent_identification import search_latent
 from islands.facade.results.model_simulation import SHOOTING
+from islands.facade.trials.prepared_data import PreparedData
 from islands.models.latent import LatentModel
 from islands.models.parametric import ParametricModel
 from islands.persistence.models import MODEL_CLASSES
@@ -84,9 +86,9 @@ def fit_class(
             steps.report(f"{SEARCH}: generation {done} of {whole}", (done + 1) / (whole + 1))
 
         method = {"method": "fit"}
-        latent = search_latent(record, split, searched, seed, steps, method, on_epoch=report)
-        on_models(latent)
-        return complete_latent(latent, steps)
+        data = PreparedData(split)
+        latent, _ = search_latent(record, data, searched, seed, steps, method, on_epoch=report)
+        return _complete(latent, steps, on_models)
     found = sorted(_estimate(entry, split.estimation, steps), key=lambda pair: pair[0])
     models = [model for _, model in found[:1]]
     if not models:
@@ -99,12 +101,17 @@ def fit_class(
     settings = {"method": "fit", "model": kind, "constraints": "none", "average": 1, "shooting": interval}
     counts = {"ok": len(models)}
     search = SearchStatistics(len(models), counts, {"candidates": len(models), "bytes": 0})
-    assessed += list_simple_models(split, interval, 0, "none", steps)
     result = SearchResult(record, split, seed, settings, search, rank_models(assessed))
-    on_models(result)
-    validated = [as_candidate(entry) for entry in assessed]
-    warm_up = max(entry.model.maximum_lag for entry in assessed)
-    return with_bands(result, validated, "none", warm_up, steps)
+    return _complete(result, steps, on_models)
+
+
+def _complete(found: SearchResult, steps: Steps, on_models: ResultCallback) -> SearchResult:
+    """Return a complete result with the linear model of the same data."""
+    constraints = str(found.settings["constraints"])
+    linear = list_simple_models(found.split, found.shooting_interval, 0, constraints, steps)
+    found = add_models(found, linear)
+    on_models(found)
+    return complete_search(found, list(map(as_candidate, found.models)), steps)
 
 
 def _estimate(

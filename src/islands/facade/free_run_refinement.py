@@ -1,22 +1,26 @@
 """Estimation of the models of a fit by the error of their free runs.
 
 Least squares of the error one step ahead is biased if the measured past outputs contain noise, and the bias
-appears as superfluous terms. The models of the fit are the starts of the refinement. Of the model that is
-then recommended, the term with the least t-ratio is removed while its parameter is within two standard errors
-of zero. Least squares is kept where the free run gains little: it is efficient under white equation noise.
+appears as superfluous terms. The models of the fit are the starts of the refinement. Least squares is kept
+where the free run gains little: it is efficient under white equation noise. Of the model that is then
+recommended, terms whose parameters are within two standard errors of zero are tried without.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
 from math import inf
 
 import numpy as np
 
 from islands.estimation.estimate import estimate
-from islands.estimation.estimator_table import LEAST_SQUARES, SIGNIFICANT, refinement_criterion
+from islands.estimation.estimator_table import (
+    LEAST_SQUARES,
+    SIGNIFICANT,
+    Criterion,
+    refinement_criterion,
+)
 from islands.estimation.refinement import refine
 from islands.estimation.structure_selection.deviations import LARGE_OFFSET, find_offsets
-from islands.evolution.search_result import SearchResult, keep_best_of_sizes
+from islands.evolution.search_result import SearchResult, add_models
 from islands.expressions.tree import Constant
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
@@ -42,51 +46,28 @@ _STEPS = 30
 _LARGEST_RATIO = 0.95
 
 
-def refine_models(
-    found: SearchResult, shooting: int, warm_up: int, constraints: str, steps: Steps
-) -> tuple[SearchResult, list[Assessment]]:
-    """Refine the least-squares models of a fit on the free run.
+def refine_models(found: SearchResult, warm_up: int, steps: Steps) -> tuple[SearchResult, list[Assessment]]:
+    """Refine the least-squares models of a fit on the free run, and try the recommended one with fewer terms.
 
     Parameters
     ----------
     found : SearchResult
         Result at the rate of its split.
-    shooting : int
-        Length of a multiple-shooting interval in samples of the split.
     warm_up : int
         Number of samples before the first prediction.
-    constraints : str
-        Statements of ``constraint``.
     steps : Steps
         The refinement is an optional step.
 
     Returns
     -------
     SearchResult
-        With the best model of every size. The given result if the recommended model has neither an error that
-        is smaller by 5 % on the validation data, nor fewer terms and no larger error, or if a model of the
-        given result is exact.
+        With the best model of every size. The refined models are left out if the one that would be
+        recommended has neither an error that is smaller by 5 % on the validation data, nor fewer terms and no
+        larger error. It is the given result if a model of it is exact.
     list of Assessment
-        All models that were refined; none if the given result is returned.
+        All further models that were estimated.
     """
-    record = found.split.estimation
-    is_far = any(find_offsets(record, constraints, LARGE_OFFSET))
-
-    def refine_one(model: DynamicModel) -> Assessment | None:
-        if steps.skip(REFINEMENT):
-            return None
-        refined = refine(model, record, _FREE_RUN.interval, constraints, warm_up, _STEPS)
-        if isinstance(refined, EvaluationOutcome):
-            return None
-        return assess(refined.model, found.split, shooting, warm_up, constraints, _FREE_RUN)
-
-    def eliminate(entry: Assessment | None) -> Iterator[Assessment]:
-        while entry and (kept := _keep_significant(entry, is_far)):
-            start = estimate(kept, record, constraints, warm_up, standard_errors=False)
-            entry = None if isinstance(start, EvaluationOutcome) else refine_one(start.model)
-            if entry:
-                yield entry
-
+    reduction = _Reduction(found, warm_up, steps)
     least = min(each.validation_error for each in found.models)
     if least <= RESOLUTION * found.split.validation.output_range:
         return found, []
@@ -97,29 +78,81 @@ def refine_models(
         for each in found.models
         if each.criterion == LEAST_SQUARES and each.validation_error <= limit
     ]
-    added = [each for each in map_over_record(refine_one, starts, record.samples) if each]
-    refined = _add_models(found, added)
-    reduced: set[tuple[str, ...]] = set()
-    while (names := refined.recommended.model.parameter_names) not in reduced:
-        reduced.add(names)
-        smaller = list(eliminate(refined.recommended))
-        refined = _add_models(refined, smaller)
-        added += smaller
-    return (refined, added) if _is_better(refined.recommended, found.recommended) else (found, [])
+    samples = found.split.estimation.samples
+    added = [each for each in map_over_record(reduction.refine, starts, samples) if each]
+    refined, smaller = reduction.reduce(add_models(found, added))
+    if _is_better(refined.recommended, found.recommended):
+        return refined, [*added, *smaller]
+    return reduction.reduce(found)
 
 
-def _add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResult:
-    return replace(found, models=keep_best_of_sizes((*found.models, *models)))
+class _Reduction:
+    """Removal of insignificant terms from the equations of a fit.
+
+    Parameters
+    ----------
+    found : SearchResult
+        Result at the rate of its split.
+    warm_up : int
+        Number of samples before the first prediction.
+    steps : Steps
+    """
+
+    def __init__(self, found: SearchResult, warm_up: int, steps: Steps) -> None:
+        self._split, self._shooting = found.split, found.shooting_interval
+        self._limits = str(found.settings["constraints"]), warm_up
+        self._steps = steps
+        # The constant of signals that are far from zero belongs to the unit, not to the law.
+        self._is_far = any(find_offsets(found.split.estimation, self._limits[0], LARGE_OFFSET))
+
+    def refine(self, model: DynamicModel) -> Assessment | None:
+        """Return a model with the least error of the free run; None without one."""
+        if self._steps.skip(REFINEMENT):
+            return None
+        refined = refine(model, self._split.estimation, _FREE_RUN.interval, *self._limits, _STEPS)
+        return None if isinstance(refined, EvaluationOutcome) else self._assess(refined.model, _FREE_RUN)
+
+    def reduce(self, found: SearchResult) -> tuple[SearchResult, list[Assessment]]:
+        """Return a result with smaller forms of its recommended model, and these forms.
+
+        The term with the least t-ratio is removed while its parameter is within two standard errors of zero.
+        If a smaller form is then recommended, it is tried as well.
+        """
+        added: list[Assessment] = []
+        tried: set[tuple[str, ...]] = set()
+        while (names := found.recommended.model.parameter_names) not in tried:
+            tried.add(names)
+            smaller = list(self._eliminate(found.recommended))
+            found = add_models(found, smaller)
+            added += smaller
+        return found, added
+
+    def _eliminate(self, entry: Assessment | None) -> Iterator[Assessment]:
+        while entry and (kept := _keep_significant(entry, self._is_far)):
+            entry = self._estimate(kept, entry.criterion)
+            if entry:
+                yield entry
+
+    def _estimate(self, terms: tuple[Regressor, ...], criterion: Criterion | None) -> Assessment | None:
+        found = estimate(terms, self._split.estimation, *self._limits)
+        if isinstance(found, EvaluationOutcome):
+            return None
+        if criterion == _FREE_RUN:
+            return self.refine(found.model)
+        return self._assess(found.model, LEAST_SQUARES)
+
+    def _assess(self, model: DynamicModel, criterion: Criterion) -> Assessment:
+        constraints, warm_up = self._limits
+        return assess(model, self._split, self._shooting, warm_up, constraints, criterion)
 
 
 def _keep_significant(entry: Assessment, is_far: bool) -> tuple[Regressor, ...]:
-    """Return the regressors of a refined model without the least significant one.
+    """Return the regressors of an equation without the least significant one, apart from a constant.
 
-    The constant of signals that are far from zero belongs to the unit, not to the law. Empty if every other
-    parameter is significant, or if the parameters are not refined.
+    Empty if every other parameter is significant.
     """
     model = entry.model
-    if entry.criterion != _FREE_RUN or not isinstance(model, Model) or model.standard_errors is None:
+    if not isinstance(model, Model) or model.standard_errors is None:
         return ()
     errors = np.array(model.standard_errors)
     if is_far:

@@ -1,8 +1,6 @@
 """Identification of latent models: state spaces with static units, evolved on the islands."""
 
 from collections import Counter
-from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from islands.errors import SettingsError
@@ -10,7 +8,6 @@ from islands.estimation.estimator_table import refinement_criterion
 from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.estimation.latent_data import make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front, meet_conditions
-from islands.estimation.quantity_errors import with_quantity_errors
 from islands.evolution.engine import Engine
 from islands.evolution.latent_problem import LatentProblem, make_latent_problem
 from islands.evolution.presets import LATENT_SETTINGS
@@ -18,28 +15,25 @@ from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
     as_candidate,
-    list_simple_models,
     rank_models,
-    with_bands,
 )
 from islands.evolution.search_state import SearchState, stop_reason
 from islands.evolution.settings import Settings
 from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.evolution_run import SearchCallback, begin_search, evolve, ignore_epoch
 from islands.facade.results.model_simulation import SHOOTING
+from islands.facade.trials.prepared_data import PreparedData
 from islands.models.latent import LatentModel
-from islands.parallel import map_over_record
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_all_inputs
 from islands.records.split import Split
-from islands.validation.assessment import Assessment, assess
+from islands.validation.assessment import assess
+from islands.validation.ensemble import ValidatedModel
 
 #: Gain of the held-out error, as a fraction, that justifies a larger model of the result, and most models.
 _GAIN, _MOST_MODELS = 0.15, 10
-
-#: Name of the step.
-_ERRORS = "standard errors"
 
 #: Latent models are estimated by the error of the free run.
 _CRITERION = refinement_criterion(None)
@@ -47,30 +41,32 @@ _CRITERION = refinement_criterion(None)
 
 def search_latent(
     record: Dataset,
-    split: Split,
+    data: PreparedData,
     settings: Settings,
     seed: int,
     steps: Steps,
     described: dict[str, Any],
     *,
+    direct: bool = True,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     on_epoch: SearchCallback = ignore_epoch,
-) -> SearchResult:
+) -> tuple[SearchResult, list[ValidatedModel[DynamicModel]]]:
     """Search latent models of a record by evolution.
 
     Parameters
     ----------
     record : Dataset
         Record as passed by the user, which the result contains.
-    split : Split
-        Estimation data and validation data at the rate of the record.
+    data : PreparedData
     settings : Settings
         Settings of latent models.
     seed : int
     steps : Steps
     described : dict
         Settings of the result; those of the search are added.
+    direct : bool
+        Whether the output may read an input of the same sample. If it does, all inputs are read early.
     start, engine, on_epoch
         As for `identify`.
 
@@ -82,8 +78,11 @@ def search_latent(
     Returns
     -------
     SearchResult
-        Without a linear model for comparison and without prediction bands; see `complete_latent`.
+        Without standard errors and prediction bands.
+    list of ValidatedModel
+        Its models, from which an ensemble is made.
     """
+    split = data.split
     problem = make_latent_problem(split.estimation, settings, steps)
     if not problem.linear:
         raise SettingsError(
@@ -93,7 +92,7 @@ def search_latent(
     state = begin_search(start, settings.islands, seed)
     with open_engine(engine, steps.report) as opened:
         state = evolve(problem, state, settings, opened, steps, on_epoch)
-    models, infeasible = _estimate(problem, state, steps)
+    models, infeasible = _estimate(problem, state, steps, direct)
     if not models:
         raise SettingsError(
             f"no latent model meets the constraints {settings.constraints!r}: the statements exclude each "
@@ -107,9 +106,8 @@ def search_latent(
         assess(model, split, interval, constraints=settings.constraints, criterion=_CRITERION)
         for model in models
     ]
-    assessed += list_simple_models(split, interval, 0, settings.constraints, steps)
     described |= {name: getattr(settings, name) for name in sorted(LATENT_SETTINGS)}
-    described |= {"average": 1, "shooting": interval}
+    described |= {"average": data.average, "shooting": interval * data.average}
     search = SearchStatistics(
         state.evaluations,
         dict(Counter(state.outcomes) + Counter(infeasible=infeasible)),
@@ -122,28 +120,14 @@ def search_latent(
         state.caches,
         stop_reason(state, settings) or "stopped",
     )
-    return SearchResult(record, split, seed, described, search, rank_models(assessed))
+    ranked = rank_models(assessed)
+    found = SearchResult(record, split, seed, described, search, ranked, average=data.average)
+    return found, list(map(as_candidate, ranked))
 
 
-def complete_latent(found: SearchResult, steps: Steps) -> SearchResult:
-    """Return the result of a search with standard errors, a linear model for comparison and bands."""
-    data = found.split.estimation
-    add = partial(_add_errors, record=data, constraints=str(found.settings["constraints"]))
-    models = steps.attempt(_ERRORS, lambda: tuple(map_over_record(add, found.models, data.samples)))
-    found = found if models is None else replace(found, models=models)
-    validated = [as_candidate(entry) for entry in found.models]
-    warm_up = max(entry.model.maximum_lag for entry in found.models)
-    return with_bands(found, validated, str(found.settings["constraints"]), warm_up, steps)
-
-
-def _add_errors(entry: Assessment, record: Dataset, constraints: str) -> Assessment:
-    model = entry.model
-    if not isinstance(model, LatentModel) or model.quantity_errors is not None:
-        return entry
-    return replace(entry, model=with_quantity_errors(model, record, entry.warm_up, constraints))
-
-
-def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> tuple[list[LatentModel], int]:
+def _estimate(
+    problem: LatentProblem, state: SearchState, steps: Steps, direct: bool
+) -> tuple[list[LatentModel], int]:
     """Estimate the models of the front of size and held-out error, under the constraints.
 
     Return also the number of systems that cannot meet the constraints.
@@ -153,5 +137,6 @@ def _estimate(problem: LatentProblem, state: SearchState, steps: Steps) -> tuple
     # The linear systems may be part of the hall of fame.
     found, constraints = list(dict.fromkeys([*problem.linear, *evolved])), problem.settings.constraints
     feasible = meet_conditions(found, make_latent_data(problem.record, constraints), steps)
-    models = estimate_models(find_front(feasible, _GAIN)[-_MOST_MODELS:], problem.record, steps, constraints)
+    front = find_front(feasible, _GAIN)[-_MOST_MODELS:]
+    models = estimate_models(front, problem.record, steps, constraints, direct=direct)
     return models, len(found) - len(feasible)

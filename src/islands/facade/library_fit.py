@@ -31,17 +31,10 @@ from islands.estimation.structure_selection.deviations import (
 )
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, Population
-from islands.evolution.presets import AUTO
 from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
-    as_candidate,
     keep_best_of_sizes,
-    list_simple_models,
-    rank_models,
-    state_steps,
-    with_average,
-    with_bands,
 )
 from islands.evolution.settings import Settings
 from islands.evolution.swap_search import swap_search
@@ -49,30 +42,25 @@ from islands.facade.final_models import screen
 from islands.facade.fit_settings import FitSettings
 from islands.facade.free_run_refinement import REFINEMENT, refine_models
 from islands.facade.results.model_simulation import SHOOTING
-from islands.facade.trials.feedthrough_selection import select_feedthrough
 from islands.facade.trials.library import TrialLibrary
-from islands.facade.trials.rate_selection import select_rate
+from islands.facade.trials.prepared_data import PreparedData
 from islands.models.candidate_library import full_set
 from islands.models.narx import Model, canonical_order
 from islands.models.protocol import DynamicModel
 from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
-from islands.progress import ProgressCallback, Steps, Stop, StoppedError, ignore_progress, never_stop
+from islands.progress import Steps, StoppedError
 from islands.records.averaging import count_means
 from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess
-from islands.validation.ensemble import ValidatedModel
 
 #: Structures of every size that are simulated on the validation data.
 _SCREENED = 150
 
 #: Name of the step that computes bounds on the error of all models.
 CERTIFICATES = "bounds of the errors of all models"
-
-#: Estimators to which the linear model is added: others state the noise.
-_SIMULATING = "least-squares", "free-run"
 
 #: Name of the step that fits a library again.
 _REFIT = "fit of better subsets"
@@ -86,18 +74,14 @@ Subsets = tuple[Structure, ...]
 
 @dataclass(frozen=True, slots=True)
 class LibraryFit:
-    """Models of increasing size from one library, without certificates and prediction bands.
-
-    The comparison of several libraries does not need either.
+    """Equations of increasing size from one library.
 
     Attributes
     ----------
     found : SearchResult
-        Its models are at the rate of the split.
-    average : int
-        Number of samples of the record whose mean is one sample of the split.
-    estimates : list of ValidatedModel
-        All models that were estimated.
+        At the rate of the data, without certificates and prediction bands.
+    estimates : list of Assessment
+        All equations that were estimated.
     warm_up : int
         Number of samples before the first prediction.
     searches : tuple of SubsetSearch
@@ -107,61 +91,39 @@ class LibraryFit:
     refit : callable
         Fits the library again, with other subsets in place of those of the searches.
     steps : Steps
-        Steps of the fit, with those that were left out.
     """
 
     found: SearchResult
-    average: int
-    estimates: list[ValidatedModel[DynamicModel]]
+    estimates: list[Assessment]
     warm_up: int
     searches: tuple[SubsetSearch, ...]
     subsets: tuple[Subsets, ...]
-    refit: Callable[[Sequence[Subsets]], "LibraryFit"]
+    refit: Callable[[Steps, Sequence[Subsets]], "LibraryFit"]
     steps: Steps
 
-    @property
-    def incomplete(self) -> SearchResult:
-        """Result without certificates and prediction bands."""
-        return with_average(state_steps(self.found, self.steps), self.average)
-
-    def with_settings(self, **further: object) -> "LibraryFit":
-        """Return the fit with further settings in its result."""
-        settings = {**self.found.settings, **further}
-        return replace(self, found=replace(self.found, settings=settings))
-
-    @property
-    def recommended_equation(self) -> Assessment:
-        """Recommended model of those with terms; the linear model is the same for every library."""
-        equations = tuple(entry for entry in self.found.models if isinstance(entry.model, Model))
-        return replace(self.found, models=equations).recommended
-
-    def is_within(self, library: TrialLibrary) -> bool:
-        """Return whether a library, at the rate of the record, has all terms of the recommended model."""
-        record, model = self.found.split.estimation, self.found.recommended.model
-        pool = library.at_rate(self.average).screen(record)
+    def contains(self, model: DynamicModel, library: TrialLibrary) -> bool:
+        """Return whether a library, at the rate of the record, has all terms of a model."""
+        record = self.found.split.estimation
+        pool = library.at_rate(self.found.average).screen(record)
         return isinstance(model, Model) and any(
             set(model.regressors).issubset(add_offsets(pool, offsets))
             for offsets in _list_offsets(record, library.constraints)
         )
 
-    def complete(self) -> SearchResult:
-        """Return the result with certificates and prediction bands.
+    def certify(self) -> "LibraryFit":
+        """Return the fit with the certificates of its library.
 
         The searches for the certificates seldom find a better subset than the exchanges of the fit: in 3 of
         890 searches on 36 records. The library is then fitted again from these subsets.
         """
-        settings, steps = self.found.settings, self.steps
-        tables = steps.attempt(CERTIFICATES, self._certify) or []
+        tables = self.steps.attempt(CERTIFICATES, self._certify) or []
         subsets = [tuple(each.structure for each in table) for table in tables]
         known = [each[: len(some)] for each, some in zip(self.subsets, subsets, strict=False)]
-        again = None if subsets == known else steps.attempt(_REFIT, partial(self._fit_again, subsets))
+        again = None if subsets == known else self.steps.attempt(_REFIT, partial(self._fit_again, subsets))
         fit = again or self
         certificates = {each.terms: each for each in (reduce(combine_certificates, tables) if tables else ())}
-        found = state_steps(fit.found, fit.steps)
-        search = replace(found.search, certificates=certificates)
-        found = replace(found, search=search, settings=settings)
-        banded = with_bands(found, fit.estimates, settings["constraints"], fit.warm_up, steps)
-        return with_average(banded, fit.average)
+        search = replace(fit.found.search, certificates=certificates)
+        return replace(fit, found=replace(fit.found, search=search), steps=self.steps)
 
     def _certify(self) -> list[tuple[Certificate, ...]]:
         """Return the certificates of every search."""
@@ -170,61 +132,63 @@ class LibraryFit:
 
     def _fit_again(self, subsets: Sequence[Subsets]) -> "LibraryFit":
         """Return the fit of other subsets, unless a stop is requested before its end."""
-        fit = self.refit(subsets)
-        if fit.steps.left_out:
+        steps = Steps(
+            lambda text, _=None: self.steps.report(text, None), self.steps.stop
+        )  # no fraction falls
+        fit = self.refit(steps, subsets)
+        if steps.left_out:
             raise StoppedError(_REFIT)
         return fit
 
 
+def choose_shooting(settings: FitSettings, data: PreparedData) -> int:
+    """Return the length of a multiple-shooting interval in samples of the record.
+
+    By default, it is at most a tenth of a short record.
+    """
+    samples = data.split.estimation.samples * data.average
+    return settings.shooting or min(SHOOTING, max(1, samples // 10))
+
+
 def fit_library(
     record: Dataset,
-    split: Split,
+    data: PreparedData,
     library: TrialLibrary,
     settings: FitSettings,
-    seed: int = 0,
-    progress: ProgressCallback = ignore_progress,
-    stop: Stop = never_stop,
+    seed: int,
+    steps: Steps,
     subsets: Sequence[Subsets] = (),
 ) -> LibraryFit:
-    """Fit models of increasing size from one library and rank them on the validation data.
+    """Fit equations of increasing size from one library and rank them on the validation data.
 
     Parameters
     ----------
     record : Dataset
         Record as passed by the user, which the result contains.
-    split : Split
-        Estimation data and validation data at the rate of the record.
+    data : PreparedData
     library : TrialLibrary
+        With dead times in samples of the record.
     settings : FitSettings
     seed : int
         Stored in the result.
-    progress : callable, optional
-        Called with a message and the completed fraction.
-    stop : callable, optional
-        Called between all steps. Once it returns true and structures are known, the best one of every size
-        is estimated, and the other steps are left out; the result is marked as stopped and names them.
+    steps : Steps
+        Once a stop is requested and structures are known, the best one of every size is estimated, and the
+        other steps are left out.
     subsets : sequence of tuple of Structure
         Subsets for every search; by default those that exchanges find.
 
     Raises
     ------
     StoppedError
-        ``stop`` returned true before a structure was known.
+        A stop was requested before a structure was known.
     SettingsError
         No model could be estimated.
     RecordError
         The record is too short.
     """
-    start = split
-    # At most a tenth of a short record.
-    shooting = settings.shooting or min(SHOOTING, max(1, split.estimation.samples // 10))
-    steps = Steps(progress, stop)
-    steps("sampling rate and direct feedthrough", 0.0)
-    least = library.lags + 3 + max(library.delays, default=0)
-    split, samples = select_rate(split, settings.average, library, least, steps)
-    rated = library.at_rate(samples)
-    split = select_feedthrough(split, settings.feedthrough, rated)
-    interval = count_means(shooting, samples)
+    split = data.split
+    shooting = choose_shooting(settings, data)
+    rated, interval = library.at_rate(data.average), count_means(shooting, data.average)
     swaps = rated.make_settings(settings.max_terms, interval)
     exchange = bool(settings.certificate)
     structures, searches, started, warm_up = _select(split, rated, swaps, exchange, subsets, steps)
@@ -246,25 +210,15 @@ def fit_library(
         "constraints": library.constraints,
         "shooting": shooting,
     }
-    result = SearchResult(record, split, seed, described, search, keep_best_of_sizes(models))
+    best = keep_best_of_sizes(models)
+    result = SearchResult(record, split, seed, described, search, best, average=data.average)
     if not settings.estimator:
-        refine_all = partial(refine_models, result, interval, warm_up, library.constraints, steps)
+        refine_all = partial(refine_models, result, warm_up, steps)
         result, refined = steps.attempt(REFINEMENT, refine_all) or (result, [])
         models += refined
-    if settings.selecting_estimator in _SIMULATING:
-        # A library that the user names has no models of another kind, besides the linear one.
-        limits = interval, warm_up, library.constraints
-        simple = list_simple_models(split, *limits, steps, curves=settings.library == AUTO)
-        result = replace(result, models=rank_models([*result.models, *simple]))
-        models += simple
-    estimates = [as_candidate(entry) for entry in models]
-    warm_up = max(warm_up, *(entry.model.maximum_lag for entry in models))
 
-    def report_again(text: str, _fraction: float | None = None, /) -> None:
-        progress(text, None)  # the fraction never falls
-
-    refit = partial(fit_library, record, start, library, settings, seed, report_again, stop)
-    return LibraryFit(result, samples, estimates, warm_up, searches, started, refit, steps)
+    refit = partial(fit_library, record, data, library, settings, seed)
+    return LibraryFit(result, models, warm_up, searches, started, refit, steps)
 
 
 def _estimate(

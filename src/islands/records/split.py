@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -179,8 +178,6 @@ def hold_out(record: Dataset, validation: Dataset) -> Dataset:
     return replace(join((parts.estimation, parts.validation)), held_out=validation.samples)
 
 
-# The fits of all libraries share what is identified of the means.
-@lru_cache(maxsize=2)
 def average_split(split: Split, count: int) -> Split:
     """Return the split with means of ``count`` samples; the split itself for a count of 1."""
     if count == 1:

@@ -26,7 +26,8 @@ from islands.evolution.presets import (
 )
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.facade.automatic.kind_choice import Choice, StoppedChoiceError, choice_from_document
+from islands.facade.automatic.choice import Choice, choice_from_document
+from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.identify import identify_record
 from islands.persistence.checkpoints import (
@@ -131,7 +132,7 @@ def run(
             if preset == AUTO and len(job["outputs"]) == 1:
                 preset = _choose_preset(data, held_out, job, searching, stop, folder, run_options.figures)
                 # Checkpoints contain the job, so a resumed run does not choose again.
-                job = {**job, "choice": preset.to_document()}
+                job = {**job, "choice": preset.to_checkpoint()}
             checkpoints = _CheckpointWriter(folder, job, searching, state, spent)
             began = perf_counter() - spent
             try:

@@ -1,26 +1,30 @@
 """Choice of the preset ``auto``: kind of record and dead times.
 
-Trials on the estimation data exclude kinds (see `try_kinds`). The others are fitted, and their recommended
-models are compared on the validation data.
+Trials on the estimation data exclude kinds (see `try_kinds`). The others are fitted to the same data. Their
+recommended models are compared on the validation data, and the models of all of them form one front.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import isfinite, lcm
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import inf, isfinite
 from types import MappingProxyType
-from typing import Any
 
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import BANDS, SearchResult
+from islands.facade.automatic.choice import Choice
 from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
-from islands.facade.library_fit import CERTIFICATES, LibraryFit
+from islands.facade.fit_settings import FitSettings
+from islands.facade.front import Front, list_simple
+from islands.facade.library_fit import CERTIFICATES, LibraryFit, fit_library
 from islands.facade.trials.library import TrialLibrary
+from islands.facade.trials.prepared_data import PreparedData, prepare_data
 from islands.progress import Steps, StoppedError
 from islands.records.dataset import Dataset
 from islands.records.inspection.rest import check_rest
+from islands.records.split import Split
 from islands.rounding import RESOLUTION
-from islands.validation.assessment import Assessment, average_errors
+from islands.validation.assessment import Assessment
 from islands.validation.recommendation import describe_exclusion, list_rivals, measure_size, recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
@@ -32,9 +36,6 @@ NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
 #: Name of the step that compares the fits of the kinds.
 CHOICE = "choice of the kind of record"
 
-#: Fits the library of a kind with the dead times of the trials.
-FitKind = Callable[[TrialLibrary], LibraryFit]
-
 
 class StoppedChoiceError(StoppedError):
     """The choice was stopped after the fit of one kind or more.
@@ -42,7 +43,7 @@ class StoppedChoiceError(StoppedError):
     Attributes
     ----------
     found : SearchResult
-        Result of the kind with the least error on the validation data.
+        Result of the kinds that were fitted.
     """
 
     def __init__(self, step: str, found: SearchResult) -> None:
@@ -50,77 +51,15 @@ class StoppedChoiceError(StoppedError):
         self.found = found
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """Kind of record and dead times that the preset ``auto`` chose.
-
-    Attributes
-    ----------
-    kind : str
-        An entry of ``KINDS``.
-    delays : tuple of int
-        Dead time of each input in samples of the record; empty if there is none.
-    reasons : tuple of str
-        What was chosen and why, in two sentences.
-    errors : mapping
-        Free-run RMSE on the validation data of the recommended model of each kind that was compared there,
-        as a fraction of the output range of the estimation data, at least `RESOLUTION`. If a model describes
-        means of samples, the errors of all are those of means of the same length. A kind is missing if it has
-        no model with a finite error.
-    trials : mapping
-        The same of small models on held-out parts of the estimation data.
-    """
-
-    kind: str
-    delays: tuple[int, ...]
-    reasons: tuple[str, ...]
-    errors: Mapping[str, float]
-    trials: Mapping[str, float]
-
-    def to_document(self) -> dict[str, Any]:
-        """Return the choice as JSON values."""
-        return {
-            "kind": self.kind,
-            "delays": list(self.delays),
-            "reasons": list(self.reasons),
-            "errors": dict(self.errors),
-            "trials": dict(self.trials),
-        }
-
-
-def choice_from_document(document: Mapping[str, Any]) -> Choice:
-    """Return a choice from its JSON values.
-
-    Raises
-    ------
-    SettingsError
-        A value is missing or of another type.
-    """
-    try:
-        return Choice(
-            str(document["kind"]),
-            tuple(map(int, document["delays"])),
-            tuple(map(str, document["reasons"])),
-            _read_errors(document["errors"]),
-            _read_errors(document["trials"]),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise SettingsError(
-            f"the stored choice of a preset is damaged ({error!r}): start a new run"
-        ) from error
-
-
-def _read_errors(document: Mapping[str, Any]) -> Mapping[str, float]:
-    return MappingProxyType({str(kind): float(error) for kind, error in document.items()})
-
-
 def choose_kind(
     record: Dataset,
+    split: Split,
     libraries: Mapping[str, TrialLibrary],
-    delays: Sequence[int] | None,
-    fit_kind: FitKind,
+    settings: FitSettings,
+    least: int,
+    seed: int,
     steps: Steps,
-) -> tuple[Choice, Mapping[str, LibraryFit]]:
+) -> tuple[Choice, Front | None]:
     """Choose the kind of a record.
 
     The recommended models with terms of the kinds are compared as `recommend` compares the models of a
@@ -132,13 +71,17 @@ def choose_kind(
     Parameters
     ----------
     record : Dataset
-        Estimation data without missing values.
+        Record as passed by the user.
+    split : Split
+        Estimation data and validation data at the rate of the record, without missing values.
     libraries : mapping
         Library and constraints of each kind that may be chosen, the simplest first.
-    delays : sequence of int or None
-        Dead times; None estimates them.
-    fit_kind : callable
-        Fits a library to the data; it is called for every kind that the trials do not exclude.
+    settings : FitSettings
+        Settings of the fits. Without dead times, these are estimated.
+    least : int
+        Fewest samples of a segment that permit a prediction without dead times.
+    seed : int
+        Stored in the results.
     steps : Steps
 
     Raises
@@ -148,76 +91,143 @@ def choose_kind(
 
     Returns
     -------
-    tuple of Choice and mapping
-        The choice, and the fits of the kinds that were compared.
+    tuple of Choice and Front
+        The choice without models, and the models of the kinds that were fitted; None if no fit has one.
     """
-    libraries = _drop_repeated(libraries)
-    if not record.output_range > 0.0:
-        *_, kind = libraries
-        sentence = f"{_describe(libraries[kind], kind)}, because the output is constant."
-        nothing: Mapping[str, float] = MappingProxyType({})
-        return Choice(kind, tuple(delays or ()), (sentence, NO_DEAD_TIME), nothing, nothing), {}
-    trials = try_kinds(record, libraries, delays, steps)
+    libraries, estimation = _drop_repeated(libraries), split.estimation
+    if estimation.output_range > 0.0:
+        trials = try_kinds(estimation, libraries, settings.delays, steps)
+    else:
+        trials = KindTrials(tuple(settings.delays or ()), {list(libraries)[-1]: inf})
     promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
-    # One kind alone needs no comparison.
-    fitted = {kind: libraries[kind].with_delays(trials.delays) for kind in promising[len(promising) == 1 :]}
-    fits = _fit_each(fitted, {}, fit_kind, steps)
-    bounded = {kind: each for kind, each in fits.items() if _is_bounded(each.recommended_equation)}
-    compared, errors, count = _measure_alike(record, bounded)
-    kind, reason = _select_kind(record, libraries, trials, compared, errors, count)
+    promising = promising or list(trials.promising[:1])
+    least += max(trials.delays, default=0)
+    first = libraries[min(promising, key=trials.errors.__getitem__)].with_delays(trials.delays)
+    data = prepare_data(split, settings.average, settings.feedthrough, first, least, steps)
+    # Models of hysteresis keep a property that no simple model has.
+    smooth = [each for each in libraries.values() if not constraint(each.constraints).sums]
+    simple = list_simple(data, smooth[0].with_delays(trials.delays), settings, steps) if smooth else []
+    fits = _KindFits(record, data, simple, settings, seed, steps)
+    fits.add({kind: libraries[kind].with_delays(trials.delays) for kind in promising})
+    errors = fits.measure_errors()
+    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors)
     failure = steps.not_computed.get(DEAD_TIMES)
     used, sentence = trials.delays, f"Dead times are not computed: {failure}." if failure else NO_DEAD_TIME
-    if delays is not None:
+    chosen = kind
+    if settings.delays is not None:
         sentence = f"The dead times are as given: {list(used)}."
     elif used:
-        used, sentence = _compare_delays(record, libraries[kind], kind, used, fits, fit_kind, steps)
+        without = f"{kind} without dead time"
+        fits.add({without: libraries[kind]})
+        chosen, sentence = _compare_delays(fits, kind, without, used)
+        used = () if chosen == without else used
     choice = Choice(
         kind,
         used,
         (f"{_describe(libraries[kind], kind)}, {reason}.", sentence),
         MappingProxyType(errors),
         MappingProxyType({kind: error for kind, error in trials.errors.items() if isfinite(error)}),
+        MappingProxyType(data.to_document()),
     )
-    return choice, fits
+    return choice, fits.make_front(chosen)
 
 
-def _compare_delays(
-    record: Dataset,
-    library: TrialLibrary,
-    kind: str,
-    delays: tuple[int, ...],
-    fits: dict[str, LibraryFit],
-    fit_kind: FitKind,
-    steps: Steps,
-) -> tuple[tuple[int, ...], str]:
-    """Return the estimated dead times, or none, and why; the fit with them becomes that of the kind."""
-    without = f"{kind} without dead time"
-    libraries = {without: library, kind: library.with_delays(delays)}
-    tried = _fit_each(libraries, fits, fit_kind, steps)
-    bounded = {
-        name: tried[name]
-        for name in libraries
-        if name in tried and _is_bounded(tried[name].recommended_equation)
-    }
+class _KindFits:
+    """Fits of the libraries of several kinds to the same data.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record as passed by the user.
+    data : PreparedData
+    simple : sequence of Assessment
+        Simplest models of the same data.
+    settings : FitSettings
+    seed : int
+    steps : Steps
+    """
+
+    def __init__(
+        self,
+        record: Dataset,
+        data: PreparedData,
+        simple: Sequence[Assessment],
+        settings: FitSettings,
+        seed: int,
+        steps: Steps,
+    ) -> None:
+        self._record, self._data, self._simple = record, data, tuple(simple)
+        self._settings, self._seed, self._steps = settings, seed, steps
+        self._fits: dict[str, LibraryFit] = {}
+
+    @property
+    def bounded(self) -> dict[str, Assessment]:
+        """Recommended equation of each fit whose free run on the validation data does not diverge."""
+        models = {name: fit.found.recommended for name, fit in self._fits.items()}
+        return {name: each for name, each in models.items() if each.outcomes["validation"]["free_run"]}
+
+    def measure_errors(self) -> dict[str, float]:
+        """Return the error of each bounded equation; see `measure_share`."""
+        return {name: measure_share(each, self._data.split.estimation) for name, each in self.bounded.items()}
+
+    def add(self, libraries: Mapping[str, TrialLibrary]) -> None:
+        """Fit further libraries; one that has no model is left out.
+
+        Raises
+        ------
+        StoppedError
+            As of `choose_kind`.
+        """
+        for place, (name, library) in enumerate(libraries.items()):
+            step = f"preset auto: fit of {name}"
+            try:
+                self._steps(step, None)
+                fit = fit_library(self._record, self._data, library, self._settings, self._seed, self._steps)
+                self._fits[name] = fit
+                if self._steps.left_out:
+                    raise StoppedError(step)
+            except StoppedError as stopped:
+                if not self._fits:
+                    raise
+                missing = [f"fit of {each}" for each in list(libraries)[place:] if each not in self._fits]
+                raise StoppedChoiceError(stopped.step, self._take_found(missing)) from stopped
+            except (SettingsError, RecordError, ModelError):
+                continue  # Another library may have a model. If none has, the search reports what is wrong.
+
+    def make_front(self, name: str) -> Front | None:
+        """Return the front of a fit with those whose models meet the same constraints."""
+        fit = self._fits.get(name)
+        if fit is None:
+            return None
+        constraints = fit.found.settings["constraints"]
+        others = [
+            each
+            for each in self._fits.values()
+            if each is not fit and each.found.settings["constraints"] == constraints
+        ]
+        simple = () if constraint(constraints).sums else self._simple
+        return Front(fit, tuple(others), simple)
+
+    def _take_found(self, missing: Sequence[str]) -> SearchResult:
+        """Return the result of the fits so far, with the steps that are left out."""
+        best = min(self._fits, key=lambda name: self._fits[name].found.recommended.validation_error)
+        front = self.make_front(best)
+        assert front is not None
+        found = front.incomplete
+        left_out = (*found.search.left_out, *missing, CHOICE, CERTIFICATES, BANDS)
+        return replace(found, search=replace(found.search, ended_by="stopped", left_out=left_out))
+
+
+def _compare_delays(fits: _KindFits, kind: str, without: str, delays: tuple[int, ...]) -> tuple[str, str]:
+    """Return which of the fits with and without dead times is chosen, and why."""
+    bounded, errors = fits.bounded, fits.measure_errors()
+    compared = {name: bounded[name] for name in (without, kind) if name in bounded}
     best, reason = kind, "no model has a finite error without it"
-    if bounded:
-        best, reason = _recommend_kind(*_measure_alike(record, bounded))
-    if best in tried:
-        fits[kind] = tried[best]
+    if compared:
+        best, reason = recommend_kind(compared, {name: errors[name] for name in compared})
     verb = "is added to the lags" if best == kind else "is not used"
     samples = ", ".join(map(str, delays))
-    return libraries[best].delays, f"A dead time of {samples} samples {verb}, because {reason}."
-
-
-def _measure_alike(
-    record: Dataset, fits: Mapping[str, LibraryFit]
-) -> tuple[dict[str, Assessment], dict[str, float], int]:
-    """Return the recommended equations of fits and their errors in means of equal length, and that length."""
-    count = lcm(*(each.average for each in fits.values()))
-    models = {
-        name: average_errors(each.recommended_equation, count // each.average) for name, each in fits.items()
-    }
-    return models, {name: measure_share(model, record) for name, model in models.items()}, count
+    return best, f"A dead time of {samples} samples {verb}, because {reason}."
 
 
 def _drop_repeated(libraries: Mapping[str, TrialLibrary]) -> Mapping[str, TrialLibrary]:
@@ -226,55 +236,12 @@ def _drop_repeated(libraries: Mapping[str, TrialLibrary]) -> Mapping[str, TrialL
     return {kind: library for kind, library in libraries.items() if first[library] == kind}
 
 
-def _fit_each(
-    libraries: Mapping[str, TrialLibrary], fits: Mapping[str, LibraryFit], fit_kind: FitKind, steps: Steps
-) -> dict[str, LibraryFit]:
-    """Return the known fits and those of further libraries that have a model."""
-    fits = dict(fits)
-    missing = [name for name in libraries if name not in fits]
-    for place, name in enumerate(missing):
-        try:
-            steps(f"preset auto: fit of {name}", None)
-            fits[name] = fit_kind(libraries[name])
-            if fits[name].steps.left_out:
-                raise StoppedError(f"preset auto: fit of {name}")
-        except StoppedError as stopped:
-            if not fits:
-                raise
-            left_out = [f"fit of {each}" for each in missing[place:] if each not in fits]
-            found = [each.incomplete for each in fits.values()]
-            raise StoppedChoiceError(stopped.step, _take_best(found, left_out)) from stopped
-        except (SettingsError, RecordError, ModelError):
-            continue  # Another library may have a model. If none has, the search reports what is wrong.
-    return fits
-
-
-def _take_best(results: Sequence[SearchResult], missing: Sequence[str]) -> SearchResult:
-    """Return the result with the least error on the validation data, with the steps that were left out."""
-    left_out = dict.fromkeys([each for found in results for each in found.search.left_out])
-    count = lcm(*(each.average for each in results))
-
-    def measure(result: SearchResult) -> float:
-        return average_errors(result.recommended, count // result.average).validation_error
-
-    best = min(results, key=measure)
-    search = replace(
-        best.search, ended_by="stopped", left_out=(*left_out, *missing, CHOICE, CERTIFICATES, BANDS)
-    )
-    return replace(best, search=search)
-
-
-def _is_bounded(model: Assessment) -> bool:
-    """Return whether the free run of a model on the validation data does not diverge."""
-    return bool(model.outcomes["validation"]["free_run"])
-
-
 def measure_share(model: Assessment, record: Dataset) -> float:
     """Return the free-run RMSE on the validation data as a fraction of the output range of a record.
 
     It is at least `RESOLUTION`.
     """
-    return max(model.validation_error / record.output_range, RESOLUTION)
+    return max(model.validation_error / (record.output_range or 1.0), RESOLUTION)
 
 
 def _select_kind(
@@ -283,11 +250,12 @@ def _select_kind(
     trials: KindTrials,
     compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
-    count: int,
 ) -> tuple[str, str]:
-    """Return the kind and the reason; the errors are those of means of ``count`` samples."""
-    if not compared:
-        first = trials.promising[0]
+    """Return the kind and the reason."""
+    if not record.output_range > 0.0:
+        return trials.promising[0], "because the output is constant"
+    if len(compared) < 2:
+        first = next(iter(compared), trials.promising[0])
         if not isfinite(trials.errors[first]):
             return first, "because the record is too short for a comparison"
         return first, (
@@ -301,17 +269,23 @@ def _select_kind(
     if close and check_rest(record).value:
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
-            f"model on the validation data{_name_means(count)} is {percent(errors[close[0]])} of the output "
+            f"model on the validation data is {percent(errors[close[0]])} of the output "
             f"range of the estimation data{list_others(errors, close[0])}"
         )
-    kind, reason = _recommend_kind(compared, errors, count)
+    kind, reason = recommend_kind(compared, errors)
     return kind, f"because {reason}"
 
 
-def _recommend_kind(
-    compared: Mapping[str, Assessment], errors: Mapping[str, float], count: int
-) -> tuple[str, str]:
-    """Return which of some models is recommended, and why; the errors are those of means of samples."""
+def recommend_kind(compared: Mapping[str, Assessment], errors: Mapping[str, float]) -> tuple[str, str]:
+    """Return which of some models of kinds is recommended, and why.
+
+    Parameters
+    ----------
+    compared : mapping
+        A model of each kind, with a bounded free run.
+    errors : mapping
+        Their errors; see `measure_share`.
+    """
     kinds, models = list(compared), list(compared.values())
     sizes = [measure_size(each.model) for each in models]
     best = recommend(sizes, models, False)
@@ -323,14 +297,10 @@ def _recommend_kind(
         for each in list_rivals(best, sizes, models)
     ]
     return kind, (
-        f"the free-run RMSE of its recommended model{smallest} on the validation data{_name_means(count)} is "
+        f"the free-run RMSE of its recommended model{smallest} on the validation data is "
         f"{percent(errors[kind])} of the output range of the estimation data{list_others(errors, kind)}"
         f"{'; left out: ' + ' and '.join(left_out) if left_out else ''}"
     )
-
-
-def _name_means(count: int) -> str:
-    return f", in means of {count} samples of the record," if count > 1 else ""
 
 
 def list_others(errors: Mapping[str, float], kind: str) -> str:

@@ -2,23 +2,30 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
-from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.presets import AUTO, resolve_kinds, resolve_latent, with_tuples
-from islands.facade.automatic.kind_choice import Choice, choose_kind
+from islands.evolution.presets import AUTO, accepts_fits, resolve_kinds, resolve_latent, with_tuples
+from islands.facade.automatic.choice import Choice, keep_models
+from islands.facade.automatic.kind_choice import choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
 from islands.facade.fit_settings import FitSettings
-from islands.facade.library_fit import LibraryFit, fit_library
+from islands.facade.front import Front, list_simple
+from islands.facade.library_fit import fit_library
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
+from islands.facade.trials.prepared_data import prepare_data
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import Split, split_data
 
 #: Why latent models are not compared with models of hysteresis.
 _NO_CONTINUUM = "Latent models, which have no continuum of equilibria, were not compared."
+
+#: Settings of a search that its fits have as well.
+_COMMON = ("average", "feedthrough", "shooting", "max_terms")
+
+#: Samples besides the lags that a search needs.
+_MORE_SAMPLES = 3
 
 
 def choose_preset(
@@ -51,25 +58,27 @@ def choose_preset(
     """
     changes = with_tuples(changes)
     constraint(changes.get("constraints", "none")).check_inputs(record.inputs)
-    libraries = {kind: make_trial_library(each) for kind, each in resolve_kinds(changes).items()}
+    searches = resolve_kinds(changes)
+    libraries = {kind: make_trial_library(each) for kind, each in searches.items()}
     split = split_data(record, validation)
-    common = {name: changes[name] for name in ("average", "feedthrough", "shooting") if name in changes}
-    fit_kind = partial(fit_library, record, split, settings=FitSettings(**common), stop=stop)
+    common = {name: changes[name] for name in _COMMON if name in changes}
+    given = FitSettings(**common, delays=changes.get("library_delays"))
+    least = max(each.maximum_lag for each in searches.values()) + _MORE_SAMPLES
     steps = Steps(progress, stop)
-    delays = changes.get("library_delays")
-    choice, fits = choose_kind(split.estimation, libraries, delays, fit_kind, steps)
+    choice, front = choose_kind(record, split, libraries, given, least, 0, steps)
+    if front is None or not record.output_range > 0.0:
+        return choice
+    models = list(front.found.models)
     settings = resolve_latent(changes)
     # Models of hysteresis keep a property that latent models do not have.
     constrained = constraint(libraries[choice.kind].constraints).sums
-    if settings is None or not record.output_range > 0.0:
-        return choice
-    if constrained:
-        return replace(choice, reasons=(*choice.reasons, _NO_CONTINUUM))
-    try:
-        fit = fits.get(choice.kind) or fit_kind(libraries[choice.kind].with_delays(choice.delays))
-    except (SettingsError, RecordError, ModelError):
-        return choice  # The search reports what is wrong.
-    return compare_latent(record, split, choice, fit, replace(settings, **LATENT_TRIAL), steps)
+    if settings is not None and constrained:
+        choice = replace(choice, reasons=(*choice.reasons, _NO_CONTINUUM))
+    elif settings is not None:
+        trial = replace(settings, **LATENT_TRIAL)
+        choice, latent = compare_latent(record, front, choice, trial, steps)
+        models += latent
+    return replace(choice, models=keep_models(models)) if accepts_fits(changes) else choice
 
 
 def fit_chosen_library(
@@ -79,7 +88,7 @@ def fit_chosen_library(
     seed: int,
     progress: ProgressCallback,
     stop: Stop,
-) -> LibraryFit:
+) -> Front:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
 
     Settings that are None are chosen, or have the default of the library.
@@ -91,25 +100,40 @@ def fit_chosen_library(
     """
     degree, lags, constraints = settings.degree, settings.lags, settings.constraints
     constraint(constraints or "none").check_inputs(record.inputs)
-    fit_one = partial(fit_library, record, split, settings=settings, seed=seed, progress=progress, stop=stop)
+    steps = Steps(progress, stop)
+
+    def fit_one(library: TrialLibrary) -> Front:
+        least = _count_needed(library)
+        data = prepare_data(split, settings.average, settings.feedthrough, library, least, steps)
+        fit = fit_library(record, data, library, settings, seed, steps)
+        return Front(fit, simple=tuple(list_simple(data, library, settings, steps)))
+
     if settings.library != AUTO:
         return fit_one(take_library(settings.library, degree, lags, constraints, settings.delays or ()))
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
-    choice, fits = choose_kind(split.estimation, libraries, settings.delays, fit_one, Steps(progress, stop))
-    chosen = fits.get(choice.kind) or fit_one(libraries[choice.kind].with_delays(choice.delays))
-    return chosen.with_settings(choice=_name_by_model(choice, libraries, chosen).to_document())
+    least = max(map(_count_needed, libraries.values()))
+    choice, front = choose_kind(record, split, libraries, settings, least, seed, steps)
+    # Without a model, the fit of the chosen library reports what is wrong.
+    front = front or fit_one(libraries[choice.kind].with_delays(choice.delays))
+    return front.with_settings(choice=_name_by_model(choice, libraries, front).to_document())
 
 
-def _name_by_model(choice: Choice, libraries: Mapping[str, TrialLibrary], fit: LibraryFit) -> Choice:
+def _count_needed(library: TrialLibrary) -> int:
+    """Return the fewest samples of a segment that permit a prediction."""
+    return library.lags + _MORE_SAMPLES + max(library.delays, default=0)
+
+
+def _name_by_model(choice: Choice, libraries: Mapping[str, TrialLibrary], front: Front) -> Choice:
     """Return the choice with the first kind whose library has all terms of the recommended model.
 
     A larger library may be the only one in which a search finds a model of a smaller one.
     """
+    model = front.found.recommended.model
     for kind, library in libraries.items():
-        if kind == choice.kind:
-            break
-        if fit.is_within(library.with_delays(choice.delays)):
-            sentence = f"Its recommended model has terms of {kind} alone."
+        if front.fit.contains(model, library.with_delays(choice.delays)):
+            if kind == choice.kind:
+                break
+            sentence = f"The recommended model has terms of {kind}."
             return replace(choice, kind=kind, reasons=(*choice.reasons, sentence))
     return choice

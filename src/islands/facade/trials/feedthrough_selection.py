@@ -1,6 +1,6 @@
 """Choice of inputs with direct feedthrough, which the model reads at sample k."""
 
-from functools import lru_cache
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -47,23 +47,24 @@ def select_feedthrough(split: Split, feedthrough: str, library: TrialLibrary) ->
     if feedthrough == "no" or not measured:
         return split
     if feedthrough == "yes":
-        return _advance(split, tuple(measured))
+        return advance_split(split, measured)
     # Statistics of very large numbers overflow: no input of such a record is advanced.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = [place for place in find_direct_inputs(split.estimation) if place in measured]
         if found:
-            advanced = _advance(split, tuple(found))
+            advanced = advance_split(split, found)
             return advanced if _error(advanced, library) <= LARGEST_RATIO * _error(split, library) else split
         found = [place for place in find_linear_paths(split.estimation) if place in measured]
         if not found or find_feedback(split.estimation).value:
             return split
-        advanced = _advance(split, tuple(found))
+        advanced = advance_split(split, found)
         return advanced if _linear_error(advanced) <= LARGEST_RATIO * _linear_error(split) else split
 
 
-# The fits of all libraries share what is identified of the advanced record.
-@lru_cache(maxsize=2)
-def _advance(split: Split, places: tuple[int, ...]) -> Split:
+def advance_split(split: Split, places: Sequence[int]) -> Split:
+    """Return the split with some inputs read one sample early; see `advance_inputs`."""
+    if not places:
+        return split
     return Split(advance_inputs(split.estimation, places), advance_inputs(split.validation, places))
 
 

@@ -8,6 +8,8 @@ from scipy.signal import lfilter
 from islands.facade.fit_settings import FitSettings
 from islands.facade.library_fit import fit_library
 from islands.facade.trials.library import take_library
+from islands.facade.trials.prepared_data import PreparedData
+from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.split import split_data
 from support.portfolio_records import KINDS
@@ -16,20 +18,22 @@ from support.portfolio_records import KINDS
 def test_a_better_subset_of_the_certificates_is_fitted():
     record, _ = replace(KINDS["backlash"], samples=400).record(2)
     library = take_library("phi-polynomial", None, None, None)
-    fit = fit_library(record, split_data(record, 0.25), library, FitSettings(max_terms=5, certificate=2000))
+    data, settings = PreparedData(split_data(record, 0.25)), FitSettings(max_terms=5, certificate=2000)
+    fit = fit_library(record, data, library, settings, 0, Steps())
     found = []
 
-    def refit(subsets):
-        found.append((subsets, fit.refit(subsets)))
+    def refit(steps, subsets):
+        found.append((subsets, fit.refit(steps, subsets)))
         return found[-1][1]
 
-    complete = replace(fit, refit=refit).complete()
+    certified = replace(fit, refit=refit).certify()
     ((subsets, again),) = found
-    certified = [each.structure for each in complete.search.certificates.values()]
-    assert [list(each) for each in subsets] == [certified]
-    assert certified != list(fit.subsets[0])
-    assert [each.model for each in complete.models] == [each.model for each in again.found.models]
-    assert replace(again, refit=None).complete().search.certificates == complete.search.certificates
+    best = [each.structure for each in certified.found.search.certificates.values()]
+    assert [list(each) for each in subsets] == [best]
+    assert best != list(fit.subsets[0])
+    assert [each.model for each in certified.found.models] == [each.model for each in again.found.models]
+    certificates = replace(again, refit=None).certify().found.search.certificates
+    assert certificates == certified.found.search.certificates
 
 
 def test_a_model_is_within_each_library_that_has_its_terms():
@@ -39,6 +43,7 @@ def test_a_model_is_within_each_library_that_has_its_terms():
     record = Dataset(u, y + 1e-3 * rng.standard_normal(200), 0.1)
     settings = FitSettings(max_terms=3, certificate=0, estimator="extended-least-squares", average=1)
     library = take_library("magnitude", 1, 1, None)
-    fit = fit_library(record, split_data(record, 0.25), library, settings)
-    assert fit.is_within(take_library("polynomial", 1, 1, None))
-    assert not fit.is_within(take_library("phi-polynomial", 2, 2, None))
+    fit = fit_library(record, PreparedData(split_data(record, 0.25)), library, settings, 0, Steps())
+    model = fit.found.recommended.model
+    assert fit.contains(model, take_library("polynomial", 1, 1, None))
+    assert not fit.contains(model, take_library("phi-polynomial", 2, 2, None))

@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 
 import islands
-from islands.errors import SettingsError
 from islands.evolution.presets import resolve_kind
-from islands.facade.automatic.kind_choice import (
-    _select_kind,
-    choice_from_document,
-    measure_share,
-)
+from islands.facade.automatic.choice import choice_from_document
+from islands.facade.automatic.kind_choice import _select_kind, measure_share
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.fit_settings import FitSettings
 from islands.progress import ignore_progress, never_stop
@@ -74,11 +70,6 @@ def test_models_without_a_dead_time_compete_with_those_that_have_one(monkeypatch
     assert "validation data" in choice.reasons[1]
 
 
-def test_damaged_choice_is_refused():
-    with pytest.raises(SettingsError, match="start a new run"):
-        choice_from_document({"kind": "smooth"})
-
-
 def test_record_that_is_too_short_gets_the_simplest_kind():
     choice = choose_preset(record("first order", 10), 0.25, {})
     assert choice.kind == "smooth"
@@ -117,9 +108,9 @@ def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
     models = {"smooth": law, "magnitude": with_changes(larger, physics=bounded)}
     errors = {kind: measure_share(each, data) for kind, each in models.items()}
     libraries = dict.fromkeys(models, SimpleNamespace(constraints="none"))
-    kind, reason = _select_kind(data, libraries, None, models, errors, 1)
+    kind, reason = _select_kind(data, libraries, None, models, errors)
     assert kind == "magnitude"
     assert "; left out: smooth with a divergence at inputs held at 0.8 times their" in reason
-    kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors, 1)
+    kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors)
     assert kind == "smooth"
     assert "left out" not in reason
