@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import islands
+from islands.models.narx import Model
 from islands.models.regressor import regressor
 from islands.systems.signals import filtered_noise
 
@@ -225,7 +226,8 @@ def main() -> None:
                 beyond.append(coverage(best, new, arguments.level))
                 ensemble = best.search_result.ensemble
                 true = {regressor(islands.parse(text))[1] for text in law.terms}
-                found = {item for each in ensemble.structures for item in each.model.regressors}
+                models = [each.model for each in ensemble.structures if isinstance(each.model, Model)]
+                found = {item for model in models for item in model.regressors}
                 if true:
                     terms[noise][0].extend(ensemble.inclusion(item.text) for item in true)
                     terms[noise][1].append(sum(ensemble.inclusion(item.text) for item in found - true))

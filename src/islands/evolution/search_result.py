@@ -30,15 +30,9 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
+from islands.validation.evidence import is_linear, measure_size
 from islands.validation.prediction_bands import calibrate_bands
-from islands.validation.recommendation import (
-    Recommendation,
-    is_linear,
-    is_sound,
-    measure_size,
-    recommend,
-    recommend_fittest,
-)
+from islands.validation.recommendation import Recommendation, is_sound, recommend, recommend_fittest
 from islands.validation.simple_models import assess_curve_models, assess_linear_model
 
 #: Result of the same search.
@@ -338,7 +332,7 @@ def add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResul
 def as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
     """Return an assessed model that was estimated as a candidate of an ensemble."""
     assert entry.criterion is not None, "the models of a search are estimated"
-    return ValidatedModel(entry.model, entry.criterion, entry.metrics["validation"]["free_run"].rmse ** 2)
+    return ValidatedModel(entry.model, entry.criterion, entry.mean_square)
 
 
 def complete_search(

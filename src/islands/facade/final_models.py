@@ -28,11 +28,10 @@ from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.split import Split
-from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run_error, multiple_shooting
 from islands.validation.assessment import Assessment, assess
-from islands.validation.ensemble import ValidatedModel
+from islands.validation.ensemble import ValidatedModel, measure_square
 
 #: Model of one output that a search has found.
 Candidate: TypeAlias = ValidatedModel[DynamicModel]
@@ -41,7 +40,7 @@ Candidate: TypeAlias = ValidatedModel[DynamicModel]
 _REFINED = (8, 8)
 
 #: Lengths of the intervals of further refinements, relative to the setting ``shooting``. Short intervals
-#: weigh fast transients, long ones slow drift; the validation data decide.
+#: weigh fast transients, long ones slow drift; the error on all data decides.
 _INTERVALS = (0.3, 3.0)
 
 #: Structures of every size that are refined over all intervals.
@@ -79,10 +78,10 @@ def select_final_models(
 ) -> tuple[Assessment, ...]:
     """Assess the candidates and return the best model of every size, best first.
 
-    The best model is that with the least error on the validation data or, if the settings select by fitness,
-    on the estimation data. If the parameters are constrained, a model must have Property 1; a size without
+    The best model is that with the least error on all data or, if the settings select by fitness, on the
+    estimation data. If the parameters are constrained, a model must have Property 1; a size without
     such a model is left out. Once a stop is requested, the remaining models have no standard errors, and of a
-    long record only the sizes with the least errors on the validation data are assessed.
+    long record only the sizes with the least errors are assessed.
     """
     settings = problem.settings
     most = max(1, _ASSESSED_SAMPLES // (split.estimation.samples + split.validation.samples))
@@ -153,7 +152,7 @@ def estimate_candidates(
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
     refined over several shooting intervals. An estimator in the settings replaces both. Once a stop
     is requested, the best structure of every remaining size is estimated only; of a long record, the fittest
-    structures alone are compared. Models whose free run on the validation data diverges are left out, unless
+    structures alone are compared. Models whose free run diverges are left out, unless
     the settings select by fitness.
     """
     settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
@@ -244,7 +243,7 @@ def _estimate_models(
 ) -> list[Candidate]:
     """Return models with estimated and with refined parameters in the units of the record.
 
-    Models whose free run diverges on the validation data are returned only if the fitness selects.
+    Models whose free run diverges are returned only if the fitness selects.
     """
     found = (
         estimate(
@@ -268,7 +267,7 @@ def _estimate_models(
         if chosen is not None:
             return keep(chosen)
     estimated = [each.model for each in fitted]
-    validated = keep(_validate(estimated, LEAST_SQUARES, split.validation, settings.maximum_lag))
+    validated = keep(_validate(estimated, LEAST_SQUARES, split, settings.maximum_lag))
     if settings.refine:
         refine_all = partial(_refine_over_intervals, estimated, settings, split, steps)
         validated += keep(steps.attempt(_REFINEMENT, refine_all) or [])
@@ -309,7 +308,7 @@ def _estimate_with_choice(fitted: list[FittedStructure], settings: Settings, spl
     )
     models = [each.model for each in found if not isinstance(each, EvaluationOutcome)]
     criterion = make_criterion(settings.estimator, settings.shooting)
-    return _validate(models, criterion, split.validation, settings.maximum_lag)
+    return _validate(models, criterion, split, settings.maximum_lag)
 
 
 def _refine(
@@ -318,7 +317,7 @@ def _refine(
     """Refine models over shooting intervals and validate them; the kernels run in parallel threads.
 
     The models race (successive halving: Karnin, Koren and Somekh 2013): after some steps, a model of the half
-    with the larger error on the validation data is left as it is, unless its error still falls.
+    with the larger error on all data is left as it is, unless its error still falls.
     """
     limits = settings.constraints, settings.maximum_lag
     stop = partial(steps.skip, _REFINEMENT)
@@ -329,7 +328,7 @@ def _refine(
         return None if isinstance(begun, EvaluationOutcome) else begun
 
     def validate(entry: Refinement[DynamicModel]) -> Candidate:
-        (validated,) = _validate([entry.model], criterion, split.validation, settings.maximum_lag)
+        (validated,) = _validate([entry.model], criterion, split, settings.maximum_lag)
         return validated
 
     left: list[Candidate] = []
@@ -350,13 +349,10 @@ def _refine(
 
 
 def _validate(
-    models: Iterable[DynamicModel], criterion: Criterion, validation: Dataset, warm_up: int
+    models: Iterable[DynamicModel], criterion: Criterion, split: Split, warm_up: int
 ) -> list[Candidate]:
-    """Simulate models on the validation data and return them, least error first."""
-    validated = (
-        ValidatedModel(model, criterion, simulate_freely(model, validation, warm_up).mean_squared_error)
-        for model in models
-    )
+    """Simulate models on all data and return them, least error first."""
+    validated = (ValidatedModel(model, criterion, measure_square(model, split, warm_up)) for model in models)
     return sorted(validated, key=lambda entry: entry.order)
 
 

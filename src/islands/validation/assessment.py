@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isnan, isqrt, nan
+from math import inf, isnan, nan
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ from islands.rounding import RESOLUTION
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
+from islands.validation.evidence import count_effective
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
@@ -207,10 +208,7 @@ class Assessment:
 
     @property
     def effective_samples(self) -> float:
-        """Number of independent samples of all data, by the autocorrelation of the validation error.
-
-        The variance of a mean of squares of correlated normal values is that of so many independent ones.
-        """
+        """Number of independent samples of all data; see `count_effective`."""
         split = self.checks.split
         return count_effective(self.errors, split.estimation.samples + split.validation.samples)
 
@@ -242,16 +240,6 @@ class Assessment:
     def has_estimated_start(self) -> bool:
         """Whether the free run on the validation data starts from estimated outputs."""
         return self.checks.has_estimated_start
-
-
-def count_effective(errors: NDArray[np.float64], samples: int) -> float:
-    """Return how many of the samples are independent, by the autocorrelation of errors; NaN is left out."""
-    known = errors[~np.isnan(errors)]
-    power, lags = float(np.add.reduce(known**2)), range(1, isqrt(known.size) + 1)
-    if not power > 0.0:
-        return float(samples)
-    correlations = [float(np.add.reduce(known[lag:] * known[:-lag])) / power for lag in lags]
-    return max(2.0, samples / (1.0 + 2.0 * sum(each**2 for each in correlations)))
 
 
 def assess(
@@ -348,32 +336,6 @@ def with_refit(
         return replace(entry, refit=Refit(entry.model, samples, discarded, entry.checks, entry.constraints))
     checks = Checks(model, split, entry.warm_up)
     return replace(entry, refit=Refit(model, samples, "", checks, check_constraints(model, constraints)))
-
-
-def average_errors(assessment: Assessment, count: int) -> Assessment:
-    """Return an assessment with the errors of the free run in means of consecutive samples.
-
-    The error of a mean contains less noise than that of its samples, so that models of means and models of
-    samples are compared in means of the same length.
-
-    Parameters
-    ----------
-    assessment : Assessment
-    count : int
-        Samples of a mean. The errors of the free run on the validation data are replaced, unless it diverged,
-        and the RMSE of both parts, by the same factor.
-    """
-    whole = len(assessment.errors) // count * count
-    if count == 1 or not whole:
-        return assessment
-    errors = assessment.errors[:whole].reshape(-1, count).mean(axis=1)
-    before, after = (float(np.sqrt(np.nanmean(each**2))) for each in (assessment.errors, errors))
-    ratio = after / before if before > 0.0 else 1.0
-    averaged = {
-        part: {**found, "free_run": replace(found["free_run"], rmse=ratio * found["free_run"].rmse)}
-        for part, found in assessment.metrics.items()
-    }
-    return replace(assessment, errors=errors, metrics=averaged)
 
 
 def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Metrics]:

@@ -12,7 +12,8 @@ from islands.models.coupled_narx import CoupledModel
 from islands.records.coupled import CoupledRecord, CoupledSplit
 from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run, one_step_ahead
-from islands.validation.assessment import PARTS, count_effective
+from islands.validation.assessment import PARTS
+from islands.validation.evidence import count_effective
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import OutputBands

@@ -1,16 +1,12 @@
 """Ensemble of the models that the data do not exclude: structures of a search, with bootstrap parameters.
 
 A structure has a weight, and each of its members has parameters from a block bootstrap of the estimation
-data. The weight of a structure of ``k`` terms with the mean squared error ``e`` of its free run on the
-validation data is proportional to ``exp(-(n log e + k log n) / 2)``: the Bayesian information criterion with
-the effective number ``n`` of validation samples, which accounts for the correlation of the residual. The
-penalty of the size is necessary for inclusion probabilities. Without it the larger of two structures with
-equal errors has the same weight, and terms that are not in the law of the system have probabilities of up to
-one half. The free run starts from the initial outputs that are most likely for the structure, since the noise
-of the measured ones does not distinguish structures.
-
-A structure may be good on the validation data by chance. As in a recommendation, those whose error on the
-estimation data exceeds 1.5 times the least of the others are left out.
+data. The weight of a structure with the information criterion ``L`` of its free run on all data (see
+`islands.validation.evidence`) is proportional to ``exp(-L / 2)``. The penalty of the size is necessary for
+inclusion probabilities. Without it the larger of two structures with equal errors has the same weight, and
+terms that are not in the law of the system have probabilities of up to one half. The free run starts from the
+initial outputs that are most likely for the structure, since the noise of the measured ones does not
+distinguish structures.
 
 Structures with equal free runs state one law (see `find_laws`). In inclusion probabilities, they count as one
 of them: the shortest, and of equal sizes the recommended one.
@@ -32,10 +28,11 @@ from islands.records.coupled import AnyRecord, CoupledSplit
 from islands.records.dataset import Dataset
 from islands.records.signal_map import match_rate
 from islands.records.split import Split
-from islands.rounding import ROUNDING
+from islands.rounding import RESOLUTION, ROUNDING
 from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run, free_runs
 from islands.validation.equal_laws import find_laws
+from islands.validation.evidence import count_effective, count_terms, measure_lack, measure_size
 
 M = TypeVar("M", bound=AnyModel)
 
@@ -44,10 +41,6 @@ MEMBERS = 64
 
 #: Structures with a smaller weight are left out.
 _MIN_WEIGHT = 0.5 / MEMBERS
-
-#: Largest free-run error on the estimation data, relative to the least of the models that are as good on the
-#: validation data.
-LARGEST_ESTIMATION_RATIO = 1.5
 
 #: A member is left out if the squared error of its free run on a part of the data exceeds that of its
 #: structure by this factor: a replicate is a linear step, which may leave the stable models.
@@ -70,8 +63,7 @@ class ValidatedModel(Generic[M]):
     criterion : Criterion
         Error that its parameters minimise.
     error : float
-        Mean squared error of the free run on the validation data (see `mean_squares`); not finite if it
-        diverged.
+        Mean squared error of the free run on all data (see `measure_square`); infinite if it diverges.
     """
 
     model: M
@@ -206,10 +198,10 @@ def make_ensemble(
     Parameters
     ----------
     candidates : sequence of ValidatedModel
-        Models with parameters. Of several candidates with one structure, the one with the least validation
-        error counts. Their order has no effect.
+        Models with parameters. Of several candidates with one structure, the one with the least error
+        counts. Their order has no effect.
     split : Split or CoupledSplit
-        Estimation data, from which the members draw their parameters, and validation data, which give the
+        Estimation data, from which the members draw their parameters, and validation data; both give the
         weights.
     constraints : str
         Statements of ``constraint``, met by the candidates and then by every member.
@@ -225,13 +217,10 @@ def make_ensemble(
     Returns
     -------
     Ensemble or None
-        None if the free run of every candidate diverges on the validation data, or if ``skip`` returned true.
+        None if the free run of every candidate diverges, or if ``skip`` returned true.
     """
     structures = []
-    floor = _error_floor(split.validation)
-    best = _best_of_each_structure(candidates)
-    weighed = _weigh(best, split.validation, floor, warm_up, recommended)
-    kept = _pass_over(weighed, split.estimation, warm_up, recommended)
+    kept = _weigh(_best_of_each_structure(candidates), split, warm_up, recommended)
     laws = find_laws([candidate.model for candidate, _ in kept], split.validation, warm_up, recommended)
     for position, ((candidate, weight), law) in enumerate(zip(kept, laws, strict=True)):
         if skip():
@@ -331,8 +320,7 @@ def _best_of_each_structure(candidates: Sequence[ValidatedModel[M]]) -> list[Val
 
 def _weigh(
     candidates: list[ValidatedModel[M]],
-    validation: AnyRecord,
-    floor: float,
+    split: Split | CoupledSplit,
     warm_up: int,
     recommended: AnyModel | None,
 ) -> list[tuple[ValidatedModel[M], float]]:
@@ -340,86 +328,78 @@ def _weigh(
 
     The recommended one is the last if its weight is smaller.
     """
-    if not candidates:
+    models: list[AnyModel] = [candidate.model for candidate in candidates]
+    if not models:
         return []
-    best = simulate_freely(candidates[0].model, validation, warm_up).y
-    residual = (validation.y - best)[find_predicted(best)]
-    count = sum(map(effective_samples, np.atleast_2d(residual.T)))
-    sizes = np.array([candidate.model.size for candidate in candidates])
-    errors = np.array([candidate.error for candidate in candidates])
-    scores = _score(errors + floor, sizes, count)
+    squares = np.array([each.error for each in candidates])
+    samples = _count_independent(models[int(squares.argmin())], split, warm_up)
+    sizes, terms = [measure_size(model) for model in models], count_terms(models)
+
+    def measure() -> NDArray[np.float64]:
+        return measure_lack(models, sizes, np.maximum(squares, RESOLUTION**2), samples, terms)
+
+    lack = measure()
     # An estimate of initial outputs that the error lacks changes it by less than this part.
-    reach = -0.5 * count * np.log1p(-LEAST_SHARE) - np.log(_MIN_WEIGHT)
-    for at in np.flatnonzero(scores >= scores.max() - reach):
-        errors[at] -= _measure_initial_noise(candidates[at].model, validation, warm_up)
-    scores = _score(np.maximum(errors, 0.0) + floor, sizes, count)
-    weights = np.exp(scores - scores.max())
+    reach = -samples * np.log1p(-LEAST_SHARE) - 2.0 * np.log(_MIN_WEIGHT)
+    for at in np.flatnonzero(lack <= lack.min() + reach):
+        squares[at] -= _measure_start_noise(models[at], split, warm_up)
+    lack = measure()
+    weights = np.exp(0.5 * (lack.min() - lack))
     weights /= weights.sum()
     order = [int(index) for index in np.argsort(-weights, kind="stable") if weights[index] >= _MIN_WEIGHT]
     if recommended is not None:
         names = recommended.parameter_names
-        order += [
-            index
-            for index, each in enumerate(candidates)
-            if each.model.parameter_names == names and index not in order
-        ]
+        order += [at for at, each in enumerate(models) if each.parameter_names == names and at not in order]
         weights = np.maximum(weights, np.finfo(float).tiny)
     kept = weights[order] / weights[order].sum()
     return [(candidates[index], float(weight)) for index, weight in zip(order, kept, strict=True)]
 
 
-def _pass_over(
-    weighed: list[tuple[ValidatedModel[M], float]],
-    estimation: AnyRecord,
-    warm_up: int,
-    recommended: AnyModel | None,
-) -> list[tuple[ValidatedModel[M], float]]:
-    """Return the candidates whose error on the estimation data is close to the least of them.
+def measure_square(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:
+    """Return the mean squared error of the free run on all data, relative to the squared output range.
 
-    The recommended one is kept. The weights sum to 1.
+    With several outputs, it is the geometric mean of their errors (see `mean_squares`). Infinite after a
+    divergence.
     """
-    if len(weighed) < 2:
-        return weighed
-    errors = np.array([_measure_error(candidate.model, estimation, warm_up) for candidate, _ in weighed])
-    errors += _error_floor(estimation)
-    close = errors <= LARGEST_ESTIMATION_RATIO**2 * errors.min()
-    names = None if recommended is None else recommended.parameter_names
-    kept = [
-        each
-        for each, is_close in zip(weighed, close, strict=True)
-        if is_close or each[0].model.parameter_names == names
-    ]
-    total = sum(weight for _, weight in kept)
-    return [(candidate, weight / total) for candidate, weight in kept]
+    total = 0.0
+    for record in (split.estimation, split.validation):
+        run = simulate_freely(model, record, warm_up)
+        if not run.outcome:
+            return inf
+        total += float(mean_squares(record, run.y[None], find_predicted(run.y))[0]) * record.samples
+    return total / (split.estimation.samples + split.validation.samples) / _scale(split.estimation)
 
 
-def _measure_error(model: AnyModel, record: AnyRecord, warm_up: int) -> float:
-    """Return the mean squared error of a free run; infinite if it diverges."""
-    run = simulate_freely(model, record, warm_up)
-    return float(mean_squares(record, run.y[None], find_predicted(run.y))[0]) if run.outcome else inf
+def _scale(record: AnyRecord) -> float:
+    """Return the square to which the mean squares of a record are relative; those of several outputs are."""
+    return (record.output_range or 1.0) ** 2 if isinstance(record, Dataset) else 1.0
 
 
-def _score(errors: NDArray[np.float64], sizes: NDArray[np.int_], count: float) -> NDArray[np.float64]:
-    """Return the logarithms of the weights but for a constant."""
-    # The floor is 0 if the output is constant, and the ratio of two errors remains finite.
-    errors = errors + np.finfo(float).tiny * max(1.0, errors.max())
-    scores: NDArray[np.float64] = -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
-    return scores
+def _count_independent(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:
+    """Return the number of independent errors of all outputs on all data."""
+    run = simulate_freely(model, split.validation, warm_up)
+    errors = (split.validation.y - run.y).reshape(split.validation.samples, -1)
+    samples = split.estimation.samples + split.validation.samples
+    return sum(count_effective(each, samples) for each in errors.T)
 
 
-def _measure_initial_noise(model: AnyModel, validation: AnyRecord, warm_up: int) -> float:
-    """Return the part of the mean squared error of a free run that the initial outputs contribute.
+def _measure_start_noise(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:
+    """Return the part of the relative mean square of `measure_square` that the initial outputs contribute.
 
     The initial outputs are parameters of each model. The noise of the measured ones decays more slowly in a
     model with fewer past outputs.
     """
-    started = estimate_initial_outputs(model, validation, warm_up, least_share=0.0)
-    if started is validation or not isinstance(validation, Dataset):
-        return 0.0
-    run = free_run(model, started, warm_up)
-    changes: NDArray[np.float64] = started.y - match_rate(model, validation).y
-    likely = run.mean_squared_error + np.nansum(changes**2) / np.count_nonzero(find_predicted(run.y))
-    return max(0.0, float(simulate_freely(model, validation, warm_up).mean_squared_error - likely))
+    total, samples = 0.0, split.estimation.samples + split.validation.samples
+    for record in (split.estimation, split.validation):
+        started = estimate_initial_outputs(model, record, warm_up, least_share=0.0)
+        if started is record or not isinstance(record, Dataset):
+            continue
+        run = free_run(model, started, warm_up)
+        changes: NDArray[np.float64] = started.y - match_rate(model, record).y
+        likely = run.mean_squared_error + np.nansum(changes**2) / np.count_nonzero(find_predicted(run.y))
+        measured = float(simulate_freely(model, record, warm_up).mean_squared_error)
+        total += max(0.0, measured - likely) * record.samples
+    return total / samples / _scale(split.estimation)
 
 
 def effective_samples(residual: NDArray[np.float64]) -> float:

@@ -1,14 +1,8 @@
 """Choice of one model among the ranked models of a search, by their evidence.
 
-The evidence of a model is the information criterion of its free run on all data: the logarithm of the mean
-squared error, and a penalty for every parameter (Schwarz, Annals of Statistics 6 (1978) 461-464) and for the
-choice of every term among many (Chen & Chen, Biometrika 95 (2008) 759-771). Errors that follow each other are
-correlated: the number of independent ones counts. The data from which the parameters are estimated count as
-well. After one step or one bump, the rest of the record has no excitation, and a constant is as good there as
-any model.
-
 A difference of ten is very strong evidence (Kass & Raftery, J. American Statistical Association 90 (1995)
-773-795). Models that differ by less are equal: a linear one comes first, then the smallest.
+773-795). Models that differ by less are equal: a linear one comes first, then the smallest. See
+`islands.validation.evidence`.
 
 The measured data are the evidence. The physics checks simulate inputs that the record does not contain, and a
 system may diverge at them as its models do: a reaction that runs away, a spring that softens. The checks
@@ -19,16 +13,12 @@ The setting ``select`` can replace this rule by the paper's choice of Appendix A
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, isnan, log
+from math import inf, isfinite, isnan
 from typing import TypeAlias
 
-from islands.expressions.tree import Constant, Lagged
-from islands.models.coupled_narx import AnyModel, CoupledModel
-from islands.models.latent import LatentModel
-from islands.models.narx import Model
-from islands.models.protocol import DynamicModel
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
+from islands.validation.evidence import count_terms, is_linear, measure_lack
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
 #: Difference of the evidence of two models that do not count as equal.
@@ -45,8 +35,6 @@ DIVERGENCE = "validation-divergence"
 PROPERTY_1 = "property-1"
 EVIDENCE = "evidence"
 CHECKS = "physics-checks"
-
-_ONE = Constant(1.0)
 
 #: A model of one or several outputs with its errors.
 Comparable: TypeAlias = Assessment | CoupledAssessment
@@ -104,28 +92,6 @@ class _Selection:
             self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
-def is_linear(model: AnyModel) -> bool:
-    """Return whether the next output of a model is linear in its inputs and its states."""
-    if isinstance(model, CoupledModel):
-        return all(map(is_linear, model.models))
-    if isinstance(model, LatentModel):
-        return not model.units
-    return isinstance(model, Model) and all(
-        isinstance(item.expression, Lagged | Constant) for item in model.regressors
-    )
-
-
-def measure_size(model: DynamicModel) -> float:
-    """Return the number of terms by which models are compared; a constant is half a term.
-
-    The zero of a unit decides whether a law has a constant: in another unit, the law with one more term is
-    still larger, and without an offset the law without a constant is smaller.
-    """
-    has_constant = isinstance(model, Model) and any(item.expression == _ONE for item in model.regressors)
-    has_level = isinstance(model, LatentModel) and not model.units
-    return model.free_size - 0.5 * (has_constant or has_level)
-
-
 def recommend(
     sizes: Sequence[float], assessments: Sequence[Assessment], hysteresis: bool, unit: str = ""
 ) -> Recommendation:
@@ -156,8 +122,8 @@ def recommend(
     selection.keep(DIVERGENCE, bounded)
     if hysteresis:
         selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
-    terms = {name for entry in assessments for name in _list_terms(entry.model)}
-    lack = _measure_lack(selection.left, sizes, assessments, len(terms))
+    terms = count_terms([entry.model for entry in assessments])
+    lack = _measure_lack(selection.left, sizes, assessments, terms)
     reference = min(selection.left, key=lambda at: (lack[at], at))
     limit = lack[reference] + DECISIVE
     selection.keep(EVIDENCE, [at for at in selection.left if lack[at] <= limit])
@@ -208,39 +174,17 @@ def _take_simplest(
 def _measure_lack(
     places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Comparable], terms: int
 ) -> dict[int, float]:
-    """Return the information criteria of some models, less of one with more evidence.
-
-    Parameters
-    ----------
-    places : sequence of int
-        Models with a bounded free run.
-    sizes, assessments
-        Of all models.
-    terms : int
-        Number of terms among which equations choose. A curve is chosen among about as many.
-    """
-    closest = min((assessments[at] for at in places), key=lambda entry: entry.mean_square)
-    samples, choice = closest.effective_samples, 2.0 * log(max(1, terms))
-    return {
-        at: samples * log(assessments[at].mean_square)
-        + sizes[at] * log(samples)
-        + choice * _count_choices(assessments[at].model)
-        for at in places
-    }
-
-
-def _list_terms(model: DynamicModel) -> Sequence[str]:
-    """Return the terms of an equation, which are chosen among others."""
-    return model.parameter_names if isinstance(model, Model) else ()
-
-
-def _count_choices(model: AnyModel) -> int:
-    """Return how many terms of a model, or curves, are chosen among others."""
-    if is_linear(model):
-        return 0
-    if isinstance(model, CoupledModel):
-        return sum(map(_count_choices, model.models))
-    return len(model.units) if isinstance(model, LatentModel) else len(_list_terms(model))
+    """Return the information criteria of some models, which have a bounded free run."""
+    compared = [assessments[at] for at in places]
+    closest = min(compared, key=lambda entry: entry.mean_square)
+    lack = measure_lack(
+        [entry.model for entry in compared],
+        [sizes[at] for at in places],
+        [entry.mean_square for entry in compared],
+        closest.effective_samples,
+        terms,
+    )
+    return dict(zip(places, lack.tolist(), strict=True))
 
 
 def recommend_fittest(

@@ -51,6 +51,10 @@ class Certificate:
         """Return the fraction by which another model of the size could be better than one with an error."""
         return max(0.0, 1.0 - self.bound / error) if error > 0.0 else 0.0
 
+    def permits(self, error: float) -> bool:
+        """Return whether a model of the library can have an error: it is not below the bound."""
+        return error >= (1.0 - RESOLUTION) * self.bound
+
     def proves(self, error: float) -> bool:
         """Return whether no model of the size is better than one with an error."""
         return self.gap(error) <= RESOLUTION

@@ -25,7 +25,8 @@ from islands.records.inspection.rest import check_rest
 from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.recommendation import describe_exclusion, list_rivals, measure_size, recommend
+from islands.validation.evidence import measure_size
+from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
 #: models keep that property.

@@ -3,15 +3,16 @@
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-import numpy as np
-
 from islands.estimation.estimator_table import refinement_criterion
 from islands.models.coupled_narx import CoupledModel
 from islands.models.narx import Model
 from islands.progress import Steps
 from islands.records.coupled import CoupledSplit
-from islands.simulation.predictors import free_run
-from islands.validation.ensemble import ValidatedModel, find_predicted, make_ensemble, mean_squares
+from islands.validation.ensemble import (
+    ValidatedModel,
+    make_ensemble,
+    measure_square,
+)
 from islands.validation.prediction_bands import OutputBands, calibrate_output_bands
 
 #: Name of the step.
@@ -58,7 +59,7 @@ def make_bands(
     def compute() -> OutputBands | None:
         steps.report(_BANDS, 1.0)
         candidates = [
-            ValidatedModel(each, _CRITERION, _validate(each, data, warm_up))
+            ValidatedModel(each, _CRITERION, measure_square(each, data, warm_up))
             for each in _list_rivals(model, ranked, ranks)
         ]
         ensemble = make_ensemble(candidates, data, constraints, warm_up, seed, skip, model)
@@ -78,11 +79,3 @@ def _list_rivals(
         for rank, other in enumerate(models, start=1):
             if rank != chosen:
                 yield CoupledModel((*model.models[:place], other, *model.models[place + 1 :]))
-
-
-def _validate(model: CoupledModel, data: CoupledSplit, warm_up: int) -> float:
-    """Return the error on the validation data; infinite if the free run diverges."""
-    run = free_run(model, data.validation, warm_up)
-    if not run.outcome:
-        return np.inf
-    return float(mean_squares(data.validation, run.y[None], find_predicted(run.y))[0])

@@ -48,7 +48,7 @@ from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.recommendation import measure_size
+from islands.validation.evidence import measure_size
 
 #: Largest number of accepted steps of the common refinement over each interval.
 _STEPS = 20

@@ -15,8 +15,8 @@ from islands.records.coupled import CoupledSplit
 from islands.records.input_lead import advance_all_inputs
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
+from islands.validation.evidence import measure_size
 from islands.validation.prediction_bands import OutputBands, PredictionBands
-from islands.validation.recommendation import measure_size
 
 
 def couple_latent_results(data: CoupledSplit, results: Sequence[Result]) -> JointCandidate:

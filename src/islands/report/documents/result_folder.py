@@ -48,10 +48,10 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
+from islands.validation.evidence import is_linear
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure, missing_structure
-from islands.validation.recommendation import is_linear
 from islands.validation.residual_tests import ResidualTests
 
 SCHEMA = "islands.result/1"

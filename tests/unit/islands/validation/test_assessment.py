@@ -11,7 +11,7 @@ from islands.errors import RecordError
 from islands.records.dataset import Dataset, join
 from islands.records.split import Split
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
-from islands.validation.assessment import MODES, PARTS, assess, average_errors
+from islands.validation.assessment import MODES, PARTS, assess
 from islands.validation.metrics import metrics
 
 SHOOTING = 7
@@ -173,13 +173,3 @@ def test_validation_part_without_a_prediction_is_refused():
 def test_a_diverged_free_run_has_no_errors():
     found = assess(EXPLOSIVE, Split(record(200), record(90, seed=1, size=3.0)), 200)
     assert found.errors.size == 0
-    assert average_errors(found, 3) is found
-
-
-def test_errors_in_means_are_those_of_the_means_of_the_data():
-    data = record(90)
-    found = average_errors(assess(LINEAR, Split(record(200), data), SHOOTING, warm_up=6), 3)
-    run = free_run(LINEAR, data, 6).y
-    means = (data.y - run).reshape(-1, 3).mean(axis=1)[2:]
-    assert found.errors[2:] == pytest.approx(means / np.ptp(data.y))
-    assert found.metrics["validation"]["free_run"].rmse == pytest.approx(np.sqrt(np.mean(means**2)))

@@ -12,12 +12,7 @@ from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import ClusterSum, ExcursionTest, ExtremeTest, HoldTest, PhysicsChecks
-from islands.validation.recommendation import (
-    Exclusion,
-    list_rivals,
-    recommend,
-    recommend_fittest,
-)
+from islands.validation.recommendation import Exclusion, list_rivals, recommend, recommend_fittest
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 
