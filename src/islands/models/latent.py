@@ -8,6 +8,7 @@ so that Wiener, Hammerstein and feedback systems are structures of one class (no
 representation: Schoukens and Toth, Automatica 113 (2020) 108731).
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
@@ -225,11 +226,12 @@ class LatentModel(ParametricModel):
 
     @property
     def structure(self) -> str:
-        """Order and dead times as text: ``order 2, dead time of u_V 0.3 s``."""
+        """Order, units and dead times as text: ``order 2, 2 tanh, dead time of u_V 0.3 s``."""
         step, unit = (1.0, "samples") if self.dt is None else (self.dt, "s")
         late = zip(self.column_names, self.delays, strict=False)
         parts = [f"dead time of {name} {delay * step:.4g} {unit}" for name, delay in late if delay]
-        return ", ".join([f"order {self.order}", *parts])
+        units = [f"{count} {name}" if count > 1 else name for name, count in Counter(self.units).items()]
+        return ", ".join([f"order {self.order}", *units, *parts])
 
     @property
     def input_lags(self) -> tuple[int, ...]:

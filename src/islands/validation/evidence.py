@@ -32,6 +32,15 @@ def is_linear(model: AnyModel) -> bool:
     )
 
 
+def name_form(model: AnyModel) -> str:
+    """Return the form of a model: ``linear``, ``curve`` (linear with one), ``equation``, ``state space``."""
+    if is_linear(model):
+        return "linear"
+    if isinstance(model, LatentModel):
+        return "curve" if len(model.units) == 1 else "state space"
+    return "equation"
+
+
 def measure_size(model: AnyModel) -> float:
     """Return the number of terms by which models are compared; a constant is half a term.
 

@@ -23,10 +23,10 @@ from islands.records.reading.options import ReadingOptions
 from islands.records.reading.row_range import parse_rows
 from islands.report.figures.names import LINEAR_FIGURES, MODEL_FIGURES
 from islands.report.pages.origin import REPORT_FILE
-from islands.report.text.layout import term_table, wrap
+from islands.report.text.layout import front_table, term_table, wrap
 
-#: Format of the report of a result folder.
-REPORT = "report"
+#: Formats of a result folder: its report, and the table of its models.
+REPORT, FRONT = "report", "front"
 
 
 @with_settings
@@ -37,8 +37,8 @@ def show(
         str | None,
         typer.Option(
             "--format",
-            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS, *FORMS, REPORT])}. By default one term in each line, "
-            "with its standard error and the columns of the record.",
+            help=f"{', '.join([*EXPORTS, *FILE_EXPORTS, *FORMS, REPORT, FRONT])}. By default one term in "
+            "each line, with its standard error and the columns of the record.",
         ),
     ] = None,
     out: Annotated[
@@ -88,6 +88,7 @@ def show(
     Linear systems for the design of controllers: state-space, transfer-function.
 
     The report of a result folder is one HTML file, which prints on A4, with its figures.
+    Its front is a table of all models: form, size, error and equation.
     """
     if kind in FORMS or (figure in LINEAR_FIGURES and record is None):
         if continuous and kind is None:
@@ -105,6 +106,9 @@ def show(
         return
     if record is not None:
         raise SettingsError("--record is for --figure: name one")
+    if kind == FRONT:
+        _show_front(model)
+        return
     if kind == REPORT:
         _write_report(Path(model), out)
         return
@@ -123,6 +127,13 @@ def show(
         _print("\n".join([*term_table(found), *(wrap(f"where {stated}") if stated else [])]))
         return
     _print(export_or_write(found, kind or "plain", out))
+
+
+def _show_front(folder: str) -> None:
+    saved = open_document(folder)
+    if saved.schema != "islands.result":
+        raise SettingsError(f"{folder} is not the folder of a result: --format {FRONT} lists its models")
+    _print("\n".join(front_table(saved.content)))
 
 
 def _write_report(folder: Path, out: Path | None) -> None:

@@ -48,7 +48,7 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
-from islands.validation.evidence import is_linear
+from islands.validation.evidence import is_linear, name_form
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure, missing_structure
@@ -174,9 +174,9 @@ def _output_document(place: int, entry: CoupledAssessment, steps: Steps) -> dict
 
 
 def _describe_size(model: DynamicModel) -> dict[str, Any]:
-    """Return the number of free parameters of a model, and order and dead times of a state space."""
+    """Return form and number of free parameters of a model, and the structure of a state space."""
     structure = {"structure": model.structure} if isinstance(model, LatentModel) else {}
-    return {"size": model.free_size, **structure}
+    return {"form": name_form(model), "size": model.free_size, **structure}
 
 
 def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, Any]:

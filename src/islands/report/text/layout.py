@@ -1,7 +1,9 @@
 """Layout of text for a terminal: wrapped paragraphs, and an equation with one term in each line."""
 
+from collections.abc import Mapping
 from html import escape
 from textwrap import fill
+from typing import Any
 
 from islands.models.equations import signal_names
 from islands.models.narx import Model
@@ -47,6 +49,41 @@ def term_table(model: DynamicModel) -> list[str]:
         weight = f"  {'-' if theta < 0 else '+'} {abs(theta):<11.6g}"
         lines += _break_term(weight if term == "1" else f"{weight} * {term}", error, len(weight) + 3)
     return [line.rstrip() for line in lines]
+
+
+def front_table(result: Mapping[str, Any]) -> list[str]:
+    """Return the form, the size, the error and the equation of every model of a result, each as one line.
+
+    A state space has its structure in place of the equation.
+
+    Parameters
+    ----------
+    result : mapping
+        Content of ``result.json``.
+    """
+    names, units = (result["record"][key]["output"] for key in ("names", "units"))
+    output, unit = (", ".join(each) if isinstance(each, list) else each for each in (names, units))
+    lines = [("rank", "form", "size", f"RMSE val.{unit and f' {unit}'}", f"{output}(k) =")]
+    for entry in result["models"]:
+        error = entry["metrics"]["validation"]["free_run"]["rmse"]
+        equation = entry["equation"].partition("\n")[0].partition(" = ")[2]
+        lines.append(
+            (
+                f"{entry['rank']}{MARK if entry['recommended'] else ' '}",
+                entry.get("form", ""),
+                str(entry["size"]),
+                "diverged" if error is None else f"{error:.4g}",
+                entry.get("structure", equation),
+            )
+        )
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)][:-1]
+    rows = ["  ".join([*map(str.rjust, cells, widths), last]) for *cells, last in lines]
+    return [*(shorten_line(row, WIDTH) for row in rows), LEGEND]
+
+
+def shorten_line(text: str, width: int) -> str:
+    """Return a text of at most some characters, the end of which is left out."""
+    return text if len(text) <= width else f"{text[: width - 3]}..."
 
 
 def _list_parameters(model: DynamicModel, heading: str) -> list[str]:

@@ -112,24 +112,37 @@ def table(facts: ResultFacts) -> list[str]:
 def columns(facts: ResultFacts) -> tuple[str, ...]:
     """Return the headings; those of holds only if a model claims hysteresis."""
     rank, size, *errors, residuals = _COLUMNS
-    counted = "parameters" if any("kind" in entry for entry in facts.document["models"]) else size
-    return rank, counted, *errors, *(_HYSTERESIS_COLUMNS if facts.claims_hysteresis else ()), residuals
+    counted = ("form", "parameters") if _has_forms(facts) else (size,)
+    return rank, *counted, *errors, *(_HYSTERESIS_COLUMNS if facts.claims_hysteresis else ()), residuals
+
+
+def _has_forms(facts: ResultFacts) -> bool:
+    """Return whether a result has other models than equations."""
+    return any("kind" in entry for entry in facts.document["models"])
 
 
 def rows(facts: ResultFacts) -> list[tuple[str, ...]]:
     """Return the cells of every model, in the order of the ranks."""
+    has_forms = _has_forms(facts)
     return [
-        _row(f"{entry['rank']}{MARK if entry['recommended'] else ' '}", entry, facts.claims_hysteresis)
+        _row(
+            (
+                f"{entry['rank']}{MARK if entry['recommended'] else ' '}",
+                *([entry.get("form", "")] if has_forms else []),
+            ),
+            entry,
+            facts.claims_hysteresis,
+        )
         for entry in facts.document["models"]
     ]
 
 
-def _row(rank: str, entry: Document, hysteresis: bool) -> tuple[str, ...]:
+def _row(first: tuple[str, ...], entry: Document, hysteresis: bool) -> tuple[str, ...]:
     metrics = entry["metrics"]
     estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
     estimated, validated = (entry["outcomes"][part]["free_run"] == "ok" for part in PARTS)
     return (
-        rank,
+        *first,
         str(entry["size"]),
         number(estimation["mape"], "{:.4f}", estimated),
         number(validation["mape"], "{:.4f}", validated),

@@ -2,9 +2,11 @@
 
 import itertools
 from math import nan
+from types import SimpleNamespace
 
 import islands
-from islands.evolution.search_result import rank_models
+from islands.evolution.search_result import keep_best_of_sizes, rank_models
+from islands.models.latent import LatentModel
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 
@@ -42,3 +44,32 @@ def test_ties_are_broken_by_size_and_then_by_text():
         entry(0.1, terms=("u(k-1)",)), entry(0.1, terms=("u(k-2)",)), entry(0.1, terms=("y(k-1)",))
     )
     assert_ranked_in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))
+
+
+def test_the_most_evidence_of_every_size_is_kept_and_the_best_sound_model():
+    """The error on all data counts: in the validation data, a constant may be as good as any model."""
+
+    def make(model, mean_square, validation, bounded=True):
+        metrics = {"validation": {"free_run": SimpleNamespace(rmse=validation)}}
+        holds = (SimpleNamespace(bounded=bounded),)
+        physics = SimpleNamespace(holds=holds, excursions=(), property_1=False)
+        return SimpleNamespace(model=model, mean_square=mean_square, metrics=metrics, physics=physics)
+
+    one, two = (
+        islands.make_model([(islands.parse(text), 0.5) for text in terms])
+        for terms in (("y(k-1)*u(k-1)",), ("y(k-1)*u(k-1)", "u(k-1)"))
+    )
+    linear = LatentModel(
+        order=1,
+        wiring=("a1_1",),
+        parameters=(0.5,),
+        memory=1,
+        operating_inputs=(0.0,),
+        input_names=("u",),
+        output_name="y",
+    )
+    best = make(one, 1.0, 3.0, bounded=False)
+    models = [make(one, 3.0, 1.0, bounded=False), best, make(one, 2.0, 2.0), make(one, 4.0, 0.5)]
+    others = [make(two, 9.0, 9.0), make(linear, 9.5, 9.5)]
+    kept = keep_best_of_sizes([*models, *others])
+    assert [each.mean_square for each in kept] == [2.0, 1.0, 9.0, 9.5]

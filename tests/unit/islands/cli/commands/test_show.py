@@ -55,11 +55,18 @@ def test_report_of_a_folder_is_written_into_it_or_where_it_is_asked_for(command_
     expected = tmp_path / options[1] if options else folder / "report.html"
     assert Path(out.strip()).absolute() == expected
     assert expected.read_bytes() == report_saved_result(folder)
+    code, out, _ = command_line("show", folder, "--format", "front")
+    assert (code, len(out.splitlines())) == (0, 2 + len(islands.load(folder).models))
 
 
 def test_a_report_of_no_folder_is_an_error_with_advice(command_line):
     code, _, error = command_line("show", "nothing", "--format", "report")
     assert (code, "there is no folder nothing" in error) == (2, True)
+
+
+def test_the_front_of_a_model_file_is_an_error_with_advice(model, command_line):
+    code, _, error = command_line("show", "model.json", "--format", "front")
+    assert (code, "is not the folder of a result" in error) == (2, True)
 
 
 def test_the_continuous_system_is_written_on_request(model, command_line):

@@ -7,7 +7,7 @@ import pytest
 from islands.expressions.parsing import parse
 from islands.models.equations import named_equation
 from islands.models.narx import make_model
-from islands.report.text.layout import term_table, write_html
+from islands.report.text.layout import front_table, term_table, write_html
 
 LONG = "y(k-1)*sign(u(k-10) - u(k-11))*(u(k-1) - u(k-2))*abs(u(k-7) - u(k-8))"
 
@@ -45,3 +45,22 @@ def test_names_between_backticks_are_code_in_html():
 def test_a_model_without_standard_errors_has_no_column_for_them(model):
     bare = model.with_parameters(model.parameters)
     assert not any(word in " ".join(term_table(bare)) for word in ("standard error", "fixed"))
+
+
+def test_the_front_has_a_line_for_every_model():
+    def entry(rank, error, **changes):
+        metrics = {"validation": {"free_run": {"rmse": error}}}
+        return {"rank": rank, "recommended": rank == 1, "size": 3, "metrics": metrics, **changes}
+
+    equation = "y(k) = " + " + ".join(f"{place}*u(k-{place})" for place in range(1, 20))
+    models = [
+        entry(1, 0.25, form="curve", structure="order 2, cube", equation="y(k) = x1(k)\nx1(k) = u(k-1)"),
+        entry(2, None, form="equation", equation=equation),
+    ]
+    columns = {"names": {"output": "y"}, "units": {"output": "mm"}}
+    heading, *lines, legend = front_table({"record": columns, "models": models})
+    assert heading.split() == ["rank", "form", "size", "RMSE", "val.", "mm", "y(k)", "="]
+    assert lines[0].split("  ")[-1] == "order 2, cube"
+    assert lines[1].endswith("...")
+    assert "diverged  1*u(k-1) + 2*u(k-2)" in lines[1]
+    assert max(map(len, [heading, *lines, legend])) <= 80
