@@ -17,9 +17,9 @@ from islands.evolution.search_result import AnySearchResult, without_optional_st
 from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.choice import Choice
-from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.fit import fit_record
+from islands.facade.front import StoppedFitError
 from islands.facade.identification_progress import SEARCH, IdentificationProgress, class_phases
 from islands.facade.identify import identify_record
 from islands.facade.results.identification import Result
@@ -265,7 +265,7 @@ def _identify(
         assert not isinstance(validation, CoupledRecord)
         try:
             preset = choose_preset(record, validation, spec.changes, reporter.report_stage, stop)
-        except StoppedChoiceError as stopped:
+        except StoppedFitError as stopped:
             return Result.from_search(stopped.found).with_wall_time(reporter.spent).search_result
     reporter.choice = preset if isinstance(preset, Choice) else None
     result = identify_record(

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from islands.errors import check_seed
 from islands.evolution.search_result import ResultCallback, SearchResult, ignore_result
 from islands.evolution.settings import NARX
-from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import fit_chosen_library
 from islands.facade.class_fit import fit_class
 from islands.facade.coupled.identification import fit_outputs
 from islands.facade.fit_settings import FitSettings
+from islands.facade.front import StoppedFitError
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
 from islands.progress import (
@@ -169,6 +169,6 @@ def fit_record(
         fit = fit.with_settings(validation=held_out)
         on_models(fit.incomplete)
         found = fit.complete()
-    except StoppedChoiceError as stopped:
+    except StoppedFitError as stopped:
         found = replace(stopped.found, settings={**stopped.found.settings, "validation": held_out})
     return Result.from_search(refit_models(found, validation, Steps(progress, stop)))

@@ -1,23 +1,29 @@
 """Front of a record: all models of the same data that compete, of every kind."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from islands.evolution.presets import AUTO
 from islands.evolution.search_result import (
+    BANDS,
     SearchResult,
+    SearchStatistics,
     add_models,
     as_candidate,
     complete_search,
     list_simple_models,
+    rank_models,
     state_steps,
     with_average,
 )
 from islands.facade.fit_settings import FitSettings
-from islands.facade.library_fit import LibraryFit, choose_shooting
+from islands.facade.library_fit import CERTIFICATES, LibraryFit, choose_shooting, describe_fit
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData
-from islands.progress import Steps
+from islands.progress import Steps, StoppedError
 from islands.records.averaging import count_means
+from islands.records.dataset import Dataset
+from islands.records.split import Split
 from islands.validation.assessment import Assessment
 
 #: Estimators whose models compete with those of the free run: others state the noise.
@@ -95,3 +101,49 @@ def list_simple(
     interval = count_means(choose_shooting(settings, data), data.average)
     limits = interval, warm_up, library.constraints
     return list_simple_models(data.split, *limits, steps, curves=settings.library == AUTO)
+
+
+class StoppedFitError(StoppedError):
+    """A fit was stopped after its first model.
+
+    Attributes
+    ----------
+    found : SearchResult
+        Result of the models so far.
+    """
+
+    def __init__(self, step: str, found: SearchResult, left_out: Iterable[str]) -> None:
+        super().__init__(step)
+        missing = (*found.search.left_out, *left_out, CERTIFICATES, BANDS)
+        search = replace(found.search, ended_by="stopped", left_out=missing)
+        self.found = replace(found, search=search)
+
+
+def find_linear_result(
+    record: Dataset, split: Split, library: TrialLibrary, settings: FitSettings, seed: int, steps: Steps
+) -> SearchResult | None:
+    """Return the result of the linear model alone, the first model of a front.
+
+    It takes a second, so that a stop from then on has a model. The fits of the same data do not identify it
+    again.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record as passed by the user.
+    split : Split
+        Data at the rate of the record.
+    library : TrialLibrary
+        See `list_simple`.
+    settings : FitSettings
+    seed : int
+    steps : Steps
+        The identification is an optional step.
+    """
+    data = PreparedData(split)
+    models = list_simple(data, library, replace(settings, library=library.name), steps)
+    if not models:
+        return None
+    described = describe_fit(library, settings, choose_shooting(settings, data))
+    search = SearchStatistics(len(models), {"ok": len(models)}, {"candidates": len(models), "bytes": 0})
+    return with_average(SearchResult(record, split, seed, described, search, rank_models(models)), 1)

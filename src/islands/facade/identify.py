@@ -22,12 +22,12 @@ from islands.evolution.search_result import (
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import LATENT, Settings
 from islands.facade.automatic.choice import Choice
-from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
 from islands.facade.coupled.identification import identify_outputs
 from islands.facade.engine_choice import Ray
 from islands.facade.equation_search import count_needed, search_equations
 from islands.facade.evolution_run import SearchCallback, ignore_epoch
+from islands.facade.front import StoppedFitError
 from islands.facade.latent_identification import search_latent
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
@@ -202,7 +202,7 @@ def identify_record(
     if preset == AUTO:
         try:
             preset = choose_preset(record, validation, changes, progress, stop)
-        except StoppedChoiceError as stopped:
+        except StoppedFitError as stopped:
             return Result.from_search(stopped.found)
     if isinstance(preset, Choice):
         settings = resolve_kind(preset.kind, preset.delays, with_tuples(changes))

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial, reduce
+from typing import Any
 
 from islands.available_cpus import count_cpus
 from islands.errors import SettingsError
@@ -150,6 +151,28 @@ def choose_shooting(settings: FitSettings, data: PreparedData) -> int:
     return settings.shooting or min(SHOOTING, max(1, samples // 10))
 
 
+def describe_fit(library: TrialLibrary, settings: FitSettings, shooting: int) -> dict[str, Any]:
+    """Return the settings of the result of a fit of a library, as JSON values.
+
+    Parameters
+    ----------
+    library : TrialLibrary
+    settings : FitSettings
+    shooting : int
+        See `choose_shooting`.
+    """
+    return {
+        "method": "fit",
+        **{name: value for name, value in asdict(settings).items() if name not in _OF_CLASSES},
+        "library": library.name,
+        "degree": library.degree,
+        "lags": library.lags,
+        "delays": library.delays,
+        "constraints": library.constraints,
+        "shooting": shooting,
+    }
+
+
 def fit_library(
     record: Dataset,
     data: PreparedData,
@@ -200,16 +223,7 @@ def fit_library(
         dict(outcomes),
         {"candidates": count, "bytes": 8 * count * rows},
     )
-    described = {
-        "method": "fit",
-        **{name: value for name, value in asdict(settings).items() if name not in _OF_CLASSES},
-        "library": library.name,
-        "degree": library.degree,
-        "lags": library.lags,
-        "delays": library.delays,
-        "constraints": library.constraints,
-        "shooting": shooting,
-    }
+    described = describe_fit(library, settings, shooting)
     best = keep_best_of_sizes(models)
     result = SearchResult(record, split, seed, described, search, best, average=data.average)
     if not settings.estimator:

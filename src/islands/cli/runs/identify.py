@@ -27,8 +27,8 @@ from islands.evolution.presets import (
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.choice import Choice, choice_from_document
-from islands.facade.automatic.kind_choice import StoppedChoiceError
 from islands.facade.automatic.preset_choice import choose_preset
+from islands.facade.front import StoppedFitError
 from islands.facade.identify import identify_record
 from islands.persistence.checkpoints import (
     read_checkpoint,
@@ -211,7 +211,7 @@ def _choose_preset(
         return choice_from_document(stored)
     try:
         return choose_preset(data, held_out, job["changes"], progress, stop)
-    except StoppedChoiceError as stopped:
+    except StoppedFitError as stopped:
         result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
         result.save(folder, drawing, figures)
         show_result(result, folder)

@@ -5,18 +5,17 @@ recommended models are compared on the validation data, and the models of all of
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from math import inf, isfinite
 from types import MappingProxyType
 
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.search_result import BANDS, SearchResult
+from islands.evolution.search_result import SearchResult
 from islands.facade.automatic.choice import Choice
 from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
 from islands.facade.fit_settings import FitSettings
-from islands.facade.front import Front, list_simple
-from islands.facade.library_fit import CERTIFICATES, LibraryFit, fit_library
+from islands.facade.front import Front, StoppedFitError, find_linear_result, list_simple
+from islands.facade.library_fit import LibraryFit, fit_library
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData, prepare_data
 from islands.progress import Steps, StoppedError
@@ -36,20 +35,6 @@ NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
 
 #: Name of the step that compares the fits of the kinds.
 CHOICE = "choice of the kind of record"
-
-
-class StoppedChoiceError(StoppedError):
-    """The choice was stopped after the fit of one kind or more.
-
-    Attributes
-    ----------
-    found : SearchResult
-        Result of the kinds that were fitted.
-    """
-
-    def __init__(self, step: str, found: SearchResult) -> None:
-        super().__init__(step)
-        self.found = found
 
 
 def choose_kind(
@@ -88,36 +73,56 @@ def choose_kind(
     Raises
     ------
     StoppedError
-        A stop is requested. If a kind was fitted before, the error is a `StoppedChoiceError`.
+        A stop is requested. If there is a model, the error is a `StoppedFitError`.
 
     Returns
     -------
     tuple of Choice and Front
         The choice without models, and the models of the kinds that were fitted; None if no fit has one.
     """
-    libraries, estimation = _drop_repeated(libraries), split.estimation
+    libraries = _drop_repeated(libraries)
+    # Models of hysteresis keep a property that no simple model has.
+    smooth = [each for each in libraries.values() if not constraint(each.constraints).sums]
+    linear = find_linear_result(record, split, smooth[0], settings, seed, steps) if smooth else None
+    try:
+        return _choose_kind(record, split, libraries, settings, least, seed, steps)
+    except StoppedFitError:
+        raise
+    except StoppedError as stopped:
+        if linear is None:
+            raise
+        raise StoppedFitError(stopped.step, linear, [CHOICE]) from stopped
+
+
+def _choose_kind(
+    record: Dataset,
+    split: Split,
+    libraries: Mapping[str, TrialLibrary],
+    settings: FitSettings,
+    least: int,
+    seed: int,
+    steps: Steps,
+) -> tuple[Choice, Front | None]:
+    """Choose the kind of a record; see `choose_kind`."""
+    estimation = split.estimation
     if estimation.output_range > 0.0:
         trials = try_kinds(estimation, libraries, settings.delays, steps)
     else:
         trials = KindTrials(tuple(settings.delays or ()), {list(libraries)[-1]: inf})
     promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
     promising = promising or list(trials.promising[:1])
+    late = {kind: library.with_delays(trials.delays) for kind, library in libraries.items()}
     least += max(trials.delays, default=0)
-    first = libraries[min(promising, key=trials.errors.__getitem__)].with_delays(trials.delays)
+    first = late[min(promising, key=trials.errors.__getitem__)]
     data = prepare_data(split, settings.average, settings.feedthrough, first, least, steps)
-    # Models of hysteresis keep a property that no simple model has.
-    smooth = [each for each in libraries.values() if not constraint(each.constraints).sums]
-    simple = list_simple(data, smooth[0].with_delays(trials.delays), settings, steps) if smooth else []
+    smooth = [each for each in late.values() if not constraint(each.constraints).sums]
+    simple = list_simple(data, smooth[0], settings, steps) if smooth else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
-    fits.add({kind: libraries[kind].with_delays(trials.delays) for kind in promising})
+    fits.add({kind: late[kind] for kind in promising})
     errors = fits.measure_errors()
     kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors)
-    failure = steps.not_computed.get(DEAD_TIMES)
-    used, sentence = trials.delays, f"Dead times are not computed: {failure}." if failure else NO_DEAD_TIME
-    chosen = kind
-    if settings.delays is not None:
-        sentence = f"The dead times are as given: {list(used)}."
-    elif used:
+    chosen, used, sentence = kind, trials.delays, _describe_delays(trials, settings, steps)
+    if used and settings.delays is None:
         without = f"{kind} without dead time"
         fits.add({without: libraries[kind]})
         chosen, sentence = _compare_delays(fits, kind, without, used)
@@ -131,6 +136,14 @@ def choose_kind(
         MappingProxyType(data.to_document()),
     )
     return choice, fits.make_front(chosen)
+
+
+def _describe_delays(trials: KindTrials, settings: FitSettings, steps: Steps) -> str:
+    """State the dead times that are given, or that none is known."""
+    if settings.delays is not None:
+        return f"The dead times are as given: {list(trials.delays)}."
+    failure = steps.not_computed.get(DEAD_TIMES)
+    return f"Dead times are not computed: {failure}." if failure else NO_DEAD_TIME
 
 
 class _KindFits:
@@ -191,7 +204,7 @@ class _KindFits:
                 if not self._fits:
                     raise
                 missing = [f"fit of {each}" for each in list(libraries)[place:] if each not in self._fits]
-                raise StoppedChoiceError(stopped.step, self._take_found(missing)) from stopped
+                raise StoppedFitError(stopped.step, self._take_found(), [*missing, CHOICE]) from stopped
             except (SettingsError, RecordError, ModelError):
                 continue  # Another library may have a model. If none has, the search reports what is wrong.
 
@@ -209,14 +222,12 @@ class _KindFits:
         simple = () if constraint(constraints).sums else self._simple
         return Front(fit, tuple(others), simple)
 
-    def _take_found(self, missing: Sequence[str]) -> SearchResult:
-        """Return the result of the fits so far, with the steps that are left out."""
+    def _take_found(self) -> SearchResult:
+        """Return the result of the fits so far."""
         best = min(self._fits, key=lambda name: self._fits[name].found.recommended.validation_error)
         front = self.make_front(best)
         assert front is not None
-        found = front.incomplete
-        left_out = (*found.search.left_out, *missing, CHOICE, CERTIFICATES, BANDS)
-        return replace(found, search=replace(found.search, ended_by="stopped", left_out=left_out))
+        return front.incomplete
 
 
 def _compare_delays(fits: _KindFits, kind: str, without: str, delays: tuple[int, ...]) -> tuple[str, str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from islands.estimation.parameter_constraints import constraint
@@ -10,11 +11,11 @@ from islands.facade.automatic.choice import Choice, keep_models
 from islands.facade.automatic.kind_choice import choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
 from islands.facade.fit_settings import FitSettings
-from islands.facade.front import Front, list_simple
+from islands.facade.front import Front, StoppedFitError, find_linear_result, list_simple
 from islands.facade.library_fit import fit_library
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.prepared_data import prepare_data
-from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
+from islands.progress import ProgressCallback, Steps, Stop, StoppedError, ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import Split, split_data
 
@@ -102,14 +103,16 @@ def fit_chosen_library(
     constraint(constraints or "none").check_inputs(record.inputs)
     steps = Steps(progress, stop)
 
-    def fit_one(library: TrialLibrary) -> Front:
-        least = _count_needed(library)
-        data = prepare_data(split, settings.average, settings.feedthrough, library, least, steps)
-        fit = fit_library(record, data, library, settings, seed, steps)
-        return Front(fit, simple=tuple(list_simple(data, library, settings, steps)))
-
+    fit_one = partial(_fit_one, record, split, settings, seed, steps)
     if settings.library != AUTO:
-        return fit_one(take_library(settings.library, degree, lags, constraints, settings.delays or ()))
+        library = take_library(settings.library, degree, lags, constraints, settings.delays or ())
+        linear = find_linear_result(record, split, library, settings, seed, steps)
+        try:
+            return fit_one(library)
+        except StoppedError as stopped:
+            if linear is None:
+                raise
+            raise StoppedFitError(stopped.step, linear, ()) from stopped
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
     least = max(map(_count_needed, libraries.values()))
@@ -117,6 +120,16 @@ def fit_chosen_library(
     # Without a model, the fit of the chosen library reports what is wrong.
     front = front or fit_one(libraries[choice.kind].with_delays(choice.delays))
     return front.with_settings(choice=_name_by_model(choice, libraries, front).to_document())
+
+
+def _fit_one(
+    record: Dataset, split: Split, settings: FitSettings, seed: int, steps: Steps, library: TrialLibrary
+) -> Front:
+    """Return the front of one library."""
+    least = _count_needed(library)
+    data = prepare_data(split, settings.average, settings.feedthrough, library, least, steps)
+    fit = fit_library(record, data, library, settings, seed, steps)
+    return Front(fit, simple=tuple(list_simple(data, library, settings, steps)))
 
 
 def _count_needed(library: TrialLibrary) -> int:

@@ -114,3 +114,18 @@ def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
     kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors)
     assert kind == "smooth"
     assert "left out" not in reason
+
+
+@pytest.mark.ci
+def test_a_stop_after_the_linear_model_keeps_it():
+    """It is the first model, before the kinds are tried."""
+    messages = []
+    trying = "preset auto: trial of smooth"
+    found = islands.fit(
+        record("first order", 300),
+        progress=lambda message, _=None: messages.append(message),
+        stop=lambda: trying in messages,
+    )
+    assert [each.model.kind for each in found.models] == ["latent"]
+    assert found.search_result.search.ended_by == "stopped"
+    assert "choice of the kind of record" in found.left_out
