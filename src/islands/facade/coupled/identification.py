@@ -365,9 +365,11 @@ def _couple_results(
         for name in each.parameter_names
     }
     return JointCandidate(
-        "one equation for each output",
-        sum(map(measure_size, final.models)),
-        CoupledAssessment(final, data, warm_up, refined is not None, choice.ranks),
+        CoupledAssessment(
+            *(final, data, warm_up, refined is not None, choice.ranks),
+            "one equation for each output" + (", refined together" if refined else ""),
+            sum(map(measure_size, final.models)),
+        ),
         partial(make_bands, final, ranked, choice.ranks, data, constraints, warm_up, seed, steps),
         tuple(results),
     ), len(terms)
