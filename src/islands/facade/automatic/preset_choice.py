@@ -88,10 +88,12 @@ def fit_chosen_library(
     seed: int,
     progress: ProgressCallback,
     stop: Stop,
+    equations_only: bool = False,
 ) -> Front:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
 
-    Settings that are None are chosen, or have the default of the library.
+    Settings that are None are chosen, or have the default of the library. With ``equations_only``, a library
+    that is named has no models of another kind.
 
     Raises
     ------
@@ -106,7 +108,8 @@ def fit_chosen_library(
         least = _count_needed(library)
         data = prepare_data(split, settings.average, settings.feedthrough, library, least, steps)
         fit = fit_library(record, data, library, settings, seed, steps)
-        return Front(fit, simple=tuple(list_simple(data, library, settings, steps)))
+        simple = [] if equations_only else list_simple(data, library, settings, steps)
+        return Front(fit, simple=tuple(simple))
 
     if settings.library != AUTO:
         return fit_one(take_library(settings.library, degree, lags, constraints, settings.delays or ()))
