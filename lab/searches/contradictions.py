@@ -35,7 +35,11 @@ def check(name: str) -> tuple[str, float, dict[str, list[str]]]:
     except (islands.IslandsError, pytest.skip.Exception) as error:
         return name, perf_counter() - began, {"refused": [str(error)]}
     try:
-        found = {where: find_contradictions(text) for where, text in list_texts(name, result).items()}
+        outputs = getattr(result, "output_names", ())
+        found = {
+            where: find_contradictions(text, outputs if outputs[1:] else ())
+            for where, text in list_texts(name, result).items()
+        }
     except AssertionError as error:
         found = {"folder": [str(error)]}
     return name, perf_counter() - began, {where: pairs for where, pairs in found.items() if pairs}

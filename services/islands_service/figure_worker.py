@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.search_result import SearchResult, SearchStatistics
 from islands.export import FILE_EXPORTS
+from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.model_analysis import split_point
 from islands.persistence.checkpoints import history_from_document
 from islands.persistence.ensembles import bands_from_document, ensemble_from_document
@@ -264,7 +265,8 @@ def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     names = model_figures(found, entry.model)
     model = _save_all({name: partial(FIGURES[name], entry, found.split) for name in names})
     equation = entry.model.equation().mathml
-    report = identification_report(_origin(job), result_document(found), equation, {**model, **made})
+    system = FittedModel.from_search(found.recommendation.rank, entry, found).linear_system
+    report = identification_report(_origin(job), result_document(found), equation, {**model, **made}, system)
     return {**made, REPORT: report}
 
 
@@ -331,7 +333,8 @@ def render_outputs(job: Job, store: Store, blobs: Blobs) -> dict[str, bytes]:
     }
     made = _save_all(drawn)
     complete = {**document, "models": [stored.document]}
-    report = identification_report(_origin(job), complete, fitted.model.equation().mathml, made)
+    equation, system = fitted.model.equation().mathml, fitted.linear_system
+    report = identification_report(_origin(job), complete, equation, made, system)
     figures = {f"1/{name}": figure for name, figure in made.items()}
     runs = write_free_runs(fitted.model, fitted.prediction_bands, fitted.warm_up, data, 1)
     return {**runs, **figures, REPORT: report}

@@ -41,13 +41,18 @@ def write_one(template: str, group: str, /, **facts: Any) -> str:
 def write_named(template: str, group: str = "", /, **facts: Any) -> Iterator[tuple[str, str]]:
     """Yield name and text of each statement of a group that holds; an empty group has all of them."""
     loaded = _load().get_template(f"{template}.txt")
-    for name in loaded.blocks:
-        if f"{name}_".startswith(f"{group}_" if group else ""):
-            text = attempt(partial(_render, loaded, name, facts))
-            if isinstance(text, Failure):
-                yield name, f"(not computed: {name.removeprefix(f'{group}_')}: {text.reason})"
-            elif text:
-                yield name, text
+    for name in list_statements(template, group):
+        text = attempt(partial(_render, loaded, name, facts))
+        if isinstance(text, Failure):
+            yield name, f"(not computed: {name.removeprefix(f'{group}_')}: {text.reason})"
+        elif text:
+            yield name, text
+
+
+def list_statements(template: str, group: str = "") -> list[str]:
+    """Return the names of the statements of a group; an empty group has all of them."""
+    blocks = _load().get_template(f"{template}.txt").blocks
+    return [name for name in blocks if f"{name}_".startswith(f"{group}_" if group else "")]
 
 
 def write_amount(value: float, unit: str, digits: str = ".4g") -> str:

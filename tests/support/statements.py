@@ -1,7 +1,7 @@
 """Checker of the sentences about a result: pairs of statements that exclude each other."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -50,11 +50,10 @@ EXCLUSIVE = (
     ),
     (r"the free run on the validation data diverges", r"(RMSE|,) \S+( times)? the noise level of"),
     (r"(RMSE|,) at the noise level of", r"simulation from the inputs alone: R2 [-.\d]+\d(?! ?of|[.\d])"),
-    (r"the common free run on the validation data diverges", r"As a simulation: (good|usable)"),
-    (r"the common free run on the validation data diverges", r"Good for: [^.]*simulation from the inputs"),
+    (r"the free run on the validation data diverges", r"As a simulation: (good|usable)"),
     (r"As a simulation: (good|usable)", r"Fails at: .*simulation from the inputs alone: the free run"),
     (r"Fails at: none of the checks", r"try other terms or more lags"),
-    (r"Fails at: none of the checks", r"% of the residual of \w+ is predictable \(RMS"),
+    (r"Fails at: none of the checks", r"% of the free-run residual is predictable \(RMS"),
     (r"(no smaller model is as good|: smallest of \d+ models)", r"try [^;.]*smaller model"),
     (r"Good for: no use that", r"no structure is left in the"),
     (r"one step ahead, no structure is left", r"error one step ahead is \S+ times the noise level"),
@@ -134,28 +133,30 @@ REPEATED = (
 )
 
 
-def find_contradictions(text: str) -> list[str]:
-    """Return the contradictions of a text, whose lines and tags do not count."""
+def find_contradictions(text: str, outputs: Sequence[str] = ()) -> list[str]:
+    """Return the contradictions of a text, whose lines and tags do not count.
+
+    Of several outputs, the statements about the model and about one of them at a time do not contradict each
+    other.
+    """
     joined = " ".join(re.sub(r"<[^<>]*>", " ", text).split())
+    if outputs:
+        return [each for name in outputs for each in find_contradictions(_keep_output(joined, name, outputs))]
     found = [
         f"{one} / {other}"
         for one, other in (*EXCLUSIVE, *EXCLUSIVE_OF_DIAGNOSES)
         if re.search(one, joined) and re.search(other, joined)
     ]
-    found += [
-        f"{name} has no structure, and a predictable residual"
-        for listed in re.findall(r"no structure is left in the residual of ([^.;]*)", joined)
-        for name in listed.split(" and ")
-        if re.search(rf"% of the residual of {re.escape(name)} is predictable", joined)
-    ]
-    found += [
-        f"{name} is followed to its noise, and not followed"
-        for name in re.findall(r"RMSE at the noise level of (\w+)", joined)
-        if re.search(rf"simulation from the inputs alone: R2 \S+ of {re.escape(name)}\b", joined)
-    ]
     return found + [
         f"{pattern}: {values}" for pattern in REPEATED if len(values := set(re.findall(pattern, joined))) > 1
     ]
+
+
+def _keep_output(text: str, name: str, outputs: Sequence[str]) -> str:
+    """Return a text without the statements about other outputs than one."""
+    named = "|".join(map(re.escape, outputs))
+    statement = rf"\b((?:{named})(?: and (?:{named}))*)(?:, [a-z ]+: .*?\.(?=\s|$)|: .*?(?=; |\.\s|\.$))"
+    return re.sub(statement, lambda found: found[0] if name in found[1].split(" and ") else "", text)
 
 
 def check_template(template: str, cases: Mapping[str, Iterable[Mapping[str, Any]]]) -> None:

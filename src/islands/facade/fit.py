@@ -128,6 +128,7 @@ def fit_record(
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
     on_models: ResultCallback = ignore_result,
+    equations_only: bool = False,
     **changes: Any,
 ) -> Result:
     """Fit models to a record as `fit` does, for a caller that states an extrapolation itself.
@@ -140,6 +141,8 @@ def fit_record(
         As for `fit`.
     on_models : callable
         Called with the ranked models of each output, before the optional steps.
+    equations_only : bool
+        Whether models that are no equation of a library, as the linear one, are left out.
 
     Raises
     ------
@@ -165,7 +168,7 @@ def fit_record(
         found = replace(found, settings={**found.settings, **described})
         return Result.from_search(refit_models(found, validation, Steps(progress, stop)))
     try:
-        fit = fit_chosen_library(record, split, settings, seed, progress, stop)
+        fit = fit_chosen_library(record, split, settings, seed, progress, stop, equations_only)
         fit = fit.with_settings(validation=held_out)
         on_models(fit.incomplete)
         found = fit.complete()

@@ -163,6 +163,7 @@ def identify_record(
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
     on_models: ResultCallback = ignore_result,
+    equations_only: bool = False,
     **changes: Any,
 ) -> Result:
     """Identify a model of a record as `identify` does, for a caller that states an extrapolation itself.
@@ -175,6 +176,8 @@ def identify_record(
         As for `identify`.
     on_models : callable
         Called with the ranked models of each output, before the optional steps.
+    equations_only : bool
+        Whether models that are no equation of a library, as the linear one, are left out.
 
     Raises
     ------
@@ -221,7 +224,7 @@ def identify_record(
         engine=engine,
         on_epoch=on_epoch or ignore_epoch,
     )
-    others = _list_others(found, settings, preset, steps)
+    others = [] if equations_only else _list_others(found, settings, preset, steps)
     found = add_models(found, others)
     on_models(with_average(found, found.average))
     completed = complete_search(found, [*candidates, *map(as_candidate, others)], steps)

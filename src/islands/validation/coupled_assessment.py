@@ -35,6 +35,10 @@ class CoupledAssessment:
         searches.
     ranks : tuple of int
         Rank of the model of each output in its separate search; empty if all outputs have one search.
+    structure : str
+        What the model consists of: ``a state space of 4 shared states``.
+    size : float
+        Number of parameters that have an effect, as of `measure_size`.
     bands : OutputBands or None
         Prediction bands of every output. None if the free run of the model diverges, or the search was
         stopped before them.
@@ -45,6 +49,8 @@ class CoupledAssessment:
     warm_up: int
     refined: bool
     ranks: tuple[int, ...]
+    structure: str
+    size: float
     bands: OutputBands | None = None
 
     @property

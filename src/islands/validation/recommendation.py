@@ -137,17 +137,13 @@ def recommend(
     return replace(found, reasons=tuple(filter(None, reasons)))
 
 
-def recommend_joint(
-    sizes: Sequence[float], assessments: Sequence[CoupledAssessment], terms: int
-) -> CoupledAssessment:
+def recommend_joint(assessments: Sequence[CoupledAssessment], terms: int) -> CoupledAssessment:
     """Return the simplest of the models of several outputs with the most evidence.
 
     The rule is that of `recommend`, on the common free runs. If all of them diverge, it is the first model.
 
     Parameters
     ----------
-    sizes : sequence of float
-        Numbers of parameters that have an effect.
     assessments : sequence of CoupledAssessment
     terms : int
         Number of terms among which equations choose.
@@ -155,6 +151,7 @@ def recommend_joint(
     bounded = [at for at, entry in enumerate(assessments) if isfinite(entry.mean_square)]
     if not bounded:
         return assessments[0]
+    sizes = [entry.size for entry in assessments]
     lack = _measure_lack(bounded, sizes, assessments, terms)
     limit = min(lack.values()) + DECISIVE
     equal = [at for at in bounded if lack[at] <= limit]

@@ -1,4 +1,4 @@
-/** Models of a succeeded job: metrics, equation, figures and exports. */
+/** Models of a succeeded job of one or several outputs: metrics, equation, figures and exports. */
 
 import { download, getJobPath, getJson } from "../lib/api.js";
 import { el, makeFacts, makeScrollable, makeTable, runOnceAtATime } from "../lib/dom.js";
@@ -11,8 +11,9 @@ import { makeFigure } from "./figures.js";
 import { makeLinearSystem } from "./linear_system.js";
 import { listRefits } from "./refit.js";
 import { makeReportButtons } from "./report.js";
+import { makeScenarioUpload } from "./scenario_upload.js";
 import { makeModelFront } from "./size_front.js";
-import { makeExactValue, makeTermPanel } from "./term_table.js";
+import { makeExactValue, makeQuantityPanel, makeTermPanel } from "./term_table.js";
 
 /** Display names of the export formats. */
 const EXPORTS = {
@@ -30,17 +31,23 @@ const EXPORTS = {
 
 const PARTS = ["estimation", "validation"];
 
-export const formatR2 = (value) =>
+const formatR2 = (value) =>
   Math.abs(value) < 100 ? value.toFixed(5).replace("-", "−") : formatNumber(value);
 
-/** Make a metric of the free run, or the kind of the outcome ("diverged") if there is no value. */
-function makeMetric(model, part, name, format) {
-  const value = model.metrics[part].free_run[name];
-  const outcome = model.outcomes[part].free_run;
+/** Make a metric of the free run of a model or output, or the kind of the outcome if there is no value. */
+function makeMetric({ metrics, outcomes }, part, name, format) {
+  const { rmse, [name]: value } = metrics[part].free_run;
+  const outcome = outcomes?.[part].free_run ?? (rmse === null ? "diverged" : "ok");
   if (value === null && outcome !== "ok")
     return el("span", { class: "no", title: outcome }, outcome.split(":", 1)[0]);
   return makeExactValue(value, format);
 }
+
+const makeMetrics = (each) =>
+  PARTS.flatMap((part) => [
+    makeMetric(each, part, "mape", formatNumber),
+    makeMetric(each, part, "r2", formatR2),
+  ]);
 
 const ERRORS = ["MAPE est. %", "R² est.", "MAPE val. %", "R² val."];
 
@@ -76,17 +83,14 @@ function makeRow(job, model, hysteresis) {
   return [
     el("span", {}, makeRank(job, model), mark),
     String(model.size),
-    ...PARTS.flatMap((part) => [
-      makeMetric(model, part, "mape", formatNumber),
-      makeMetric(model, part, "r2", formatR2),
-    ]),
+    ...makeMetrics(model),
     ...(hysteresis ? makeHysteresisCells(physics) : []),
     makeResidualVerdict(residuals),
   ];
 }
 
 /** Return whether models are of hysteresis: only these have Property 1; the drift of others is no defect. */
-const claimHysteresis = (models) => models.some((model) => model.physics.property_1);
+const claimHysteresis = (models) => models.some((model) => model.physics?.property_1);
 
 function makeModelTable(job, models) {
   const hysteresis = claimHysteresis(models);
@@ -98,6 +102,14 @@ function makeModelTable(job, models) {
   const modelTable = makeTable("Models, least error on the validation data first", headings, rows);
   modelTable.classList.add("models");
   return modelTable;
+}
+
+/** Make the table of the errors of each of several outputs. */
+function makeOutputTable(outputs) {
+  const headings = ["Output", ...[...ERRORS, "Free-run residual"].map((name) => [name, "figure"])];
+  const makeName = ({ name, unit }) => el("span", {}, el("bdi", {}, name), unit ? ` (${unit})` : "");
+  const rows = outputs.map((each) => [makeName(each), ...makeMetrics(each), makeResidualVerdict(each.residual)]);
+  return makeTable("Outputs, simulated together", headings, rows);
 }
 
 /** Format the name of a residual test in the notation of the literature. */
@@ -179,7 +191,7 @@ export function makeEquation(path, model, signal) {
   return host;
 }
 
-export function makeGallery(path, signal, skip = () => false) {
+function makeGallery(path, signal, skip = () => false) {
   const host = el("div", { class: "gallery" });
   poll(async () => {
     const { items } = await getJson(`${path}/figures`, { signal });
@@ -190,16 +202,10 @@ export function makeGallery(path, signal, skip = () => false) {
   return host;
 }
 
-/** The section of the linear system has this figure of latent models. */
-const isLinear = (name) => name === "bode";
-
-function makeDetail(job, model, hysteresis, signal) {
-  const path = `${getJobPath(job.id)}/models/${model.rank}`;
+/** Make the parameters of a model with the checks that are those of one output. */
+function listChecks(model, hysteresis) {
   const { physics, information } = model;
   return [
-    el("h3", { id: "model" }, `Model ${model.rank}`),
-    makeEquation(path, model, signal),
-    makeExportRow(path, model.rank),
     el(
       "div",
       { class: "pair" },
@@ -219,8 +225,27 @@ function makeDetail(job, model, hysteresis, signal) {
       ["AIC", formatNumber(information.aic, 6)],
       ["BIC", formatNumber(information.bic, 6)],
     ]),
-    makeGallery(path, signal, isLinear),
+  ];
+}
+
+/** Make the equation and the terms of the model of several outputs, or modes and gains. */
+const listParameters = (path, model, names, signal) =>
+  // The parameters of a state space are coordinates, and have no meaning one by one.
+  model.quantities
+    ? [makeQuantityPanel(model, names)]
+    : [makeEquation(path, model, signal), makeTermPanel(model)];
+
+function makeDetail(job, model, { hysteresis, names }, signal) {
+  const path = `${getJobPath(job.id)}/models/${model.rank}`;
+  return [
+    el("h3", { id: "model" }, `Model ${model.rank}`),
+    ...(names
+      ? listParameters(path, model, names, signal)
+      : [makeEquation(path, model, signal), ...listChecks(model, hysteresis)]),
+    makeExportRow(path, model.rank),
+    makeGallery(path, signal),
     makeLinearSystem(path, job.spec, signal),
+    ...(names ? [makeScenarioUpload(path, job.spec.output, signal)] : []),
   ];
 }
 
@@ -237,7 +262,7 @@ function makeSearchFigures(job, islands, signal) {
 }
 
 /** Make the sentences about the recommended model; results of earlier versions have none. */
-export function makeSentences(job) {
+function makeSentences(job) {
   const lines = job.summary?.words?.split("\n") ?? [];
   return el(
     "div",
@@ -247,11 +272,27 @@ export function makeSentences(job) {
   );
 }
 
+/** Make the overview of the models of one output: `above` and `below` the note, and `front` that marks one. */
+function makeOverview(job, models, unit, signal) {
+  const front = makeModelFront(job, models, unit, signal);
+  const islands = job.progress?.islands?.length ?? 0;
+  return {
+    front,
+    above: [front.node, makeScrollable("Models", makeModelTable(job.id, models))],
+    below: [
+      ...listRefits(models.map((model) => ({ model, name: model.rank })), "Model "),
+      makeCompareChoice(job, models) ?? "",
+    ],
+    figures: [makeSearchFigures(job.id, islands, signal)],
+  };
+}
+
 /** Make the panel of the models; `select(rank)` shows a model, the recommended one for null. */
 export function makeModelsPanel(job, rank, unit, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   const article = el("article", { class: "model", "aria-labelledby": "model" });
-  let [models, front] = [[], null];
+  const hasSeveralOutputs = Array.isArray(job.spec.output);
+  let [models, names, front] = [[], null, null];
   let controller = new AbortController();
 
   function select(newRank) {
@@ -261,9 +302,9 @@ export function makeModelsPanel(job, rank, unit, signal) {
     controller.abort();
     controller = new AbortController();
     article.dataset.rank = model.rank;
-    front.show(model);
+    front?.show(model);
     const shown = AbortSignal.any([signal, controller.signal]);
-    article.replaceChildren(...makeDetail(job, model, claimHysteresis(models), shown));
+    article.replaceChildren(...makeDetail(job, model, { hysteresis: claimHysteresis(models), names }, shown));
     for (const link of body.querySelectorAll("table.models a")) {
       const current = link.textContent === String(model.rank);
       link.closest("tr").classList.toggle("current", current);
@@ -273,20 +314,25 @@ export function makeModelsPanel(job, rank, unit, signal) {
   }
 
   poll(async () => {
-    models = (await getJson(`${getJobPath(job.id)}/models`, { signal })).items;
+    const path = getJobPath(job.id);
+    models = (await getJson(`${path}/models`, { signal })).items;
+    let overview = { above: [], below: [], figures: [] };
+    if (hasSeveralOutputs) {
+      const { outputs, record } = await getJson(`${path}/result`, { signal });
+      names = record.names;
+      overview.above = [makeScrollable("Outputs", makeOutputTable(outputs))];
+    } else {
+      overview = makeOverview(job, models, unit, signal);
+      front = overview.front;
+    }
     const note = el(
       "p",
       { class: "soft small" },
       "Errors are those of the free run. The models are ranked by the validation data, so these errors are "
         + "not an independent test.",
     );
-    const overview = makeScrollable("Models", makeModelTable(job.id, models));
-    front = makeModelFront(job, models, unit, signal);
-    const islands = job.progress?.islands?.length ?? 0;
-    const figures = makeSearchFigures(job.id, islands, signal);
-    const compare = makeCompareChoice(job, models) ?? "";
-    const notes = [note, ...listRefits(models.map((model) => ({ model, name: model.rank })), "Model ")];
-    body.replaceChildren(makeSentences(job), front.node, overview, ...notes, compare, article, figures);
+    const { above, below, figures } = overview;
+    body.replaceChildren(makeSentences(job), ...above, note, ...below, article, ...figures);
     select(rank);
     return Infinity;
   }, signal);

@@ -4,7 +4,6 @@ import { clearBanner, showProblem } from "../components/banner.js";
 import { makeRunAgainLink } from "../components/compare_choice.js";
 import { askConfirmation } from "../components/confirm.js";
 import { makeConvergencePanel } from "../components/convergence.js";
-import { makeCoupledPanel } from "../components/coupled_model.js";
 import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
 import { makeFindingsPanels } from "../components/diagnosis.js";
 import { canResume, makeFailureCard } from "../components/job_failure.js";
@@ -230,9 +229,7 @@ export function mountJob(host, { id, rank }, signal) {
       if (succeeded !== findingsHost.hasChildNodes())
         findingsHost.replaceChildren(...(succeeded ? makeFindingsPanels(job, signal) : []));
     } else if (job.state === "succeeded" && models === null && (unit !== null || hasSeveralOutputs(job))) {
-      models = hasSeveralOutputs(job)
-        ? makeCoupledPanel(job, signal)
-        : makeModelsPanel(job, rank, unit, signal);
+      models = makeModelsPanel(job, rank, unit, signal);
       // A reader of a result wants its models before the course of the search.
       status.before(modelsHost);
       modelsHost.replaceChildren(models.node);

@@ -42,7 +42,6 @@ FILES = {
     "components/comparison_report.js": _SCRIPT,
     "components/confirm.js": _SCRIPT,
     "components/convergence.js": _SCRIPT,
-    "components/coupled_model.js": _SCRIPT,
     "components/dataset.js": _SCRIPT,
     "components/diagnosing/causes.js": _SCRIPT,
     "components/diagnosing/diagnosis_form.js": _SCRIPT,

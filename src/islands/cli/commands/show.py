@@ -16,7 +16,7 @@ from islands.models.coupled_narx import CoupledModel
 from islands.models.equations import named_signals
 from islands.models.operating_point import parse_levels
 from islands.models.state_space import FORMS
-from islands.persistence.saved_documents import open_document, read_saved_model
+from islands.persistence.saved_documents import RESULT, open_document, read_saved_model
 from islands.records.coupled import couple, join_columns
 from islands.records.reading import read_dataset
 from islands.records.reading.options import ReadingOptions
@@ -90,9 +90,11 @@ def show(
     The report of a result folder is one HTML file, which prints on A4, with its figures.
     Its front is a table of all models: form, size, error and equation.
     """
-    if kind in FORMS or (figure in LINEAR_FIGURES and record is None):
+    if kind in FORMS or figure in LINEAR_FIGURES:
         if continuous and kind is None:
             raise SettingsError(f"--continuous is for the formats {', '.join(FORMS)}")
+        if record is not None:
+            raise SettingsError("--record is for figures of the model on data: a linear system needs none")
         levels = parse_levels(options.columns(at or []), "--at")
         _show_linear(model, kind, figure, out, levels, continuous)
         return
@@ -138,13 +140,16 @@ def _show_front(folder: str) -> None:
 
 def _write_report(folder: Path, out: Path | None) -> None:
     # The models take a second to import.
+    from islands.facade.results.reader import read_result  # noqa: PLC0415
     from islands.report.pages.identification import report_saved_result  # noqa: PLC0415
 
     if not folder.exists():
         raise SettingsError(f"there is no folder {folder}: a report is of the folder of a result")
-    page = report_saved_result(folder)
     path = out or (folder if folder.is_dir() else folder.parent) / REPORT_FILE
-    path.write_bytes(page)
+    if open_document(folder).schema == RESULT:
+        read_result(folder if folder.is_dir() else folder.parent).report(path)
+    else:
+        path.write_bytes(report_saved_result(folder))
     output.print(path, markup=False, highlight=False, soft_wrap=True)
 
 

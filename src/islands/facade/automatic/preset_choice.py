@@ -89,10 +89,12 @@ def fit_chosen_library(
     seed: int,
     progress: ProgressCallback,
     stop: Stop,
+    equations_only: bool = False,
 ) -> Front:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
 
-    Settings that are None are chosen, or have the default of the library.
+    Settings that are None are chosen, or have the default of the library. With ``equations_only``, a library
+    that is named has no models of another kind.
 
     Raises
     ------
@@ -103,9 +105,11 @@ def fit_chosen_library(
     constraint(constraints or "none").check_inputs(record.inputs)
     steps = Steps(progress, stop)
 
-    fit_one = partial(_fit_one, record, split, settings, seed, steps)
+    fit_one = partial(_fit_one, record, split, settings, seed, steps, equations_only)
     if settings.library != AUTO:
         library = take_library(settings.library, degree, lags, constraints, settings.delays or ())
+        if equations_only:
+            return fit_one(library)
         linear = find_linear_result(record, split, library, settings, seed, steps)
         try:
             return fit_one(library)
@@ -123,13 +127,20 @@ def fit_chosen_library(
 
 
 def _fit_one(
-    record: Dataset, split: Split, settings: FitSettings, seed: int, steps: Steps, library: TrialLibrary
+    record: Dataset,
+    split: Split,
+    settings: FitSettings,
+    seed: int,
+    steps: Steps,
+    equations_only: bool,
+    library: TrialLibrary,
 ) -> Front:
     """Return the front of one library."""
     least = _count_needed(library)
     data = prepare_data(split, settings.average, settings.feedthrough, library, least, steps)
     fit = fit_library(record, data, library, settings, seed, steps)
-    return Front(fit, simple=tuple(list_simple(data, library, settings, steps)))
+    simple = [] if equations_only else list_simple(data, library, settings, steps)
+    return Front(fit, simple=tuple(simple))
 
 
 def _count_needed(library: TrialLibrary) -> int:

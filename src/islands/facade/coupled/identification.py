@@ -40,7 +40,7 @@ from islands.facade.results.identification import Result
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.rate_selection import select_rate
 from islands.models.coupled_narx import CoupledModel
-from islands.models.narx import Model, require_narx
+from islands.models.narx import require_narx
 from islands.progress import AnswerFoundError, ProgressCallback, Steps, StoppedError
 from islands.records.averaging import AUTO, average_samples
 from islands.records.coupled import CoupledSplit
@@ -247,13 +247,6 @@ def _search_outputs(
     return results
 
 
-def _take_equations(result: Result) -> Result:
-    """Return the result without state spaces, which do not read the other outputs sample by sample."""
-    found = require_one_output(result.search_result)
-    models = tuple(entry for entry in found.models if isinstance(entry.model, Model))
-    return Result.from_search(replace(found, models=models))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Search:
     """Candidates of several outputs, and the result of the best one.
@@ -327,8 +320,9 @@ class _Search:
             data = data.map(partial(average_samples, count=count))
             joint = list_joint(data, count)
         options = {**options, "average": count}
-        found = _search_outputs(data.estimation.output_names, splits, options, steps, self.find)
-        results = [_take_equations(each) for each in found]
+        # State spaces do not read the other outputs sample by sample.
+        find = partial(self.find, equations_only=True)
+        results = _search_outputs(data.estimation.output_names, splits, options, steps, find)
         equations, terms = _couple_results(data, results, refine_together, self.seed, steps)
         return self._choose([*joint, equations], terms)
 
@@ -365,9 +359,11 @@ def _couple_results(
         for name in each.parameter_names
     }
     return JointCandidate(
-        "one equation for each output",
-        sum(map(measure_size, final.models)),
-        CoupledAssessment(final, data, warm_up, refined is not None, choice.ranks),
+        CoupledAssessment(
+            *(final, data, warm_up, refined is not None, choice.ranks),
+            "one equation for each output" + (", refined together" if refined else ""),
+            sum(map(measure_size, final.models)),
+        ),
         partial(make_bands, final, ranked, choice.ranks, data, constraints, warm_up, seed, steps),
         tuple(results),
     ), len(terms)

@@ -44,10 +44,10 @@ def couple_latent_results(data: CoupledSplit, results: Sequence[Result]) -> Join
         max(each.warm_up for each in best),
         refined=False,
         ranks=tuple(result.recommendation.rank for result in results),
+        structure="one latent model for each output",
+        size=sum(map(measure_size, models)),
     )
     return JointCandidate(
-        "one latent model for each output",
-        sum(map(measure_size, models)),
         assessed,
         lambda: OutputBands(tuple(bands)) if len(bands) == len(best) else None,
         tuple(results),

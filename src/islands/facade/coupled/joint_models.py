@@ -64,10 +64,6 @@ class JointCandidate:
 
     Attributes
     ----------
-    words : str
-        What it is: ``a state space of 4 shared states``.
-    size : float
-        Number of parameters that have an effect.
     assessed : CoupledAssessment
         Without bands.
     find_bands : callable
@@ -76,8 +72,6 @@ class JointCandidate:
         Separate result of every output; empty if one search has found the model of all of them.
     """
 
-    words: str
-    size: float
     assessed: CoupledAssessment
     find_bands: Callable[[], OutputBands | None]
     outputs: tuple[Result, ...] = ()
@@ -135,9 +129,9 @@ def _take_shared(found: SharedModel, data: CoupledSplit, steps: Steps) -> JointC
         data = data.map(advance_all_inputs)
     ensemble = Ensemble((EnsembleStructure(model, 1.0, found.draws),))
     order, is_linear = model.models[0].order, not model.models[0].units
-    words = f"a {'linear ' * is_linear}state space of {order} shared states"
+    structure = f"a {'linear ' * is_linear}state space of {order} shared states"
     return _assess(
-        words + ("" if is_linear else " whose response follows the amplitude"),
+        structure + ("" if is_linear else " whose response follows the amplitude"),
         found.size + 0.5 * len(model.models),
         model,
         data,
@@ -164,8 +158,8 @@ def _identify_linear(data: CoupledSplit, seed: int, steps: Steps) -> list[JointC
         ensemble = Ensemble((EnsembleStructure(model, 1.0, np.hstack([each[:count] for each in draws])),))
         return calibrate_output_bands(model, ensemble, data, model.maximum_lag)
 
-    words = f"a linear model of {poles} poles that the outputs share"
-    return [_assess(words, size, model, data, find_bands, steps)]
+    structure = f"a linear model of {poles} poles that the outputs share"
+    return [_assess(structure, size, model, data, find_bands, steps)]
 
 
 def _draw(model: LatentModel, split: Split, seed: int, steps: Steps) -> NDArray[np.float64]:
@@ -177,15 +171,17 @@ def _draw(model: LatentModel, split: Split, seed: int, steps: Steps) -> NDArray[
 
 
 def _assess(
-    words: str,
+    structure: str,
     size: float,
     model: CoupledModel,
     data: CoupledSplit,
     find_bands: Callable[[], OutputBands | None],
     steps: Steps,
 ) -> JointCandidate:
-    assessed = CoupledAssessment(model, data, model.maximum_lag, refined=False, ranks=())
-    return JointCandidate(words, size, assessed, lambda: steps.attempt(BANDS, find_bands))
+    assessed = CoupledAssessment(
+        *(model, data, model.maximum_lag), refined=False, ranks=(), structure=structure, size=size
+    )
+    return JointCandidate(assessed, lambda: steps.attempt(BANDS, find_bands))
 
 
 def exceeds_latent_models(found: Sequence[JointCandidate]) -> bool:
@@ -212,7 +208,7 @@ def exceeds_equations(
     steps : Steps
     """
     best = choose_candidate(found, 1)[0] if found else None
-    if best is None or best.size <= terms:
+    if best is None or best.assessed.size <= terms:
         return False
     limit, total = _LARGEST_RATIO * best.assessed.validation_error, 0.0
     for place, each in enumerate(data.estimation.records):
@@ -233,23 +229,24 @@ def choose_candidate(candidates: Sequence[JointCandidate], terms: int) -> tuple[
     terms : int
         Number of terms among which equations choose.
     """
-    chosen = recommend_joint(
-        [each.size for each in candidates], [each.assessed for each in candidates], terms
-    )
+    chosen = recommend_joint([each.assessed for each in candidates], terms)
     (best,) = (each for each in candidates if each.assessed is chosen)
     if len(candidates) < 2:
         return best, ""
-    others = "; ".join(_describe(each) for each in candidates if each is not best)
+    others = "; ".join(
+        f"{each.assessed.structure}, {each.assessed.size:g} parameters, {_state_error(each)}"
+        for each in candidates
+        if each is not best
+    )
     return best, (
         "most evidence (information criterion of the common free run on all data); error on the validation "
-        f"data (root mean square over the outputs): {_describe(best)}; compared with {others}"
+        f"data (root mean square over the outputs) {_state_error(best)}; compared with {others}"
     )
 
 
-def _describe(candidate: JointCandidate) -> str:
+def _state_error(candidate: JointCandidate) -> str:
     error = candidate.assessed.validation_error
-    stated = f"{100.0 * error:.3g} % of the range" if isfinite(error) else "diverges"
-    return f"{candidate.words}, {candidate.size:g} parameters, {stated}"
+    return f"{100.0 * error:.3g} % of the range" if isfinite(error) else "infinite, as the free run diverges"
 
 
 def join_candidate(

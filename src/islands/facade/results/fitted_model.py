@@ -1,6 +1,7 @@
 """`FittedModel`: one model of a result, new or read from a folder, or of a model file."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -34,7 +35,7 @@ from islands.models.state_space import StateSpace
 from islands.models.sympy_expression import to_sympy
 from islands.persistence.ensembles import model_file
 from islands.records.coupled import AnyRecord
-from islands.report.figures.names import FREE_RUN
+from islands.report.figures.names import FREE_RUN, LINEAR_FIGURES
 from islands.report.text.facts import BEFORE_REFIT, is_refitted
 from islands.simulation.input_response import StepResponse, step_response
 from islands.simulation.outcome import EvaluationOutcome
@@ -219,6 +220,13 @@ class FittedModel:
         """Range of the output in which the model rests, if it rests at several."""
         data = self._data_range
         return data.output if data and not isinstance(self.model, CoupledModel) else EVERYWHERE
+
+    @property
+    def linear_system(self) -> StateSpace | None:
+        """Linear system about the operating point of `linearise`; None of a model that has none there."""
+        with suppress(ModelError):
+            return self.linearise()
+        return None
 
     def plot_linear(
         self, kind: str = "bode", operating_point: "OperatingPoint | None" = None, y: ArrayLike | None = None
@@ -479,8 +487,8 @@ class FittedModel:
         ----------
         kind : str
             A key of ``islands.report.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in
-            ``metrics``), ``loop``, ``hold``, ``residuals``; of latent models ``structure``, ``curves``
-            and ``bode``.
+            ``metrics``), ``loop``, ``hold``, ``residuals``; of latent models ``structure`` and ``curves``; or
+            one of `plot_linear`, which needs no record.
         record : record or data frame, optional
             Record that is drawn; by default the validation data, with the parameters that the errors on them
             belong to. A frame has the columns of the model.
@@ -509,6 +517,8 @@ class FittedModel:
         from islands.report.figures.registry import FIGURES, draw_record_figure  # noqa: PLC0415
 
         kind = kind.replace("_", "-")
+        if kind in LINEAR_FIGURES and ax is None:
+            return self.plot_linear(kind)
         data = None if record is None else record_of_model(self.model, record)
         if isinstance(self.model, CoupledModel):
             return self._plot_outputs(self.model, kind, self.validation if data is None else data, output, ax)
@@ -534,8 +544,8 @@ class FittedModel:
 
         if kind != FREE_RUN:
             raise SettingsError(
-                f"a model of several outputs has the figure {FREE_RUN}: take others of the separate results, "
-                f"as result.outputs[0].plot({kind!r})"
+                f"a model of several outputs has the figures {', '.join((FREE_RUN, *LINEAR_FIGURES))}: take "
+                f"others of the separate results, as result.outputs[0].plot({kind!r})"
             )
         data = match_columns(model, record)
         runs = self.simulate(data).y.T

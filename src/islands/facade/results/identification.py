@@ -25,7 +25,7 @@ from islands.report.documents.result_folder import (
     result_document,
     write_result,
 )
-from islands.report.figures.names import FREE_RUN, OVERVIEW, RESPONSES, name_free_runs
+from islands.report.figures.names import FREE_RUN, LINEAR_FIGURES, OVERVIEW, RESPONSES, name_free_runs
 from islands.report.pages.origin import REPORT_FILE
 from islands.report.text.statements import describe
 from islands.report.text.summary import summary
@@ -294,6 +294,7 @@ class Result:
         return folder
 
     def _draw_figures(self, folder: Path, names: Sequence[str], steps: Steps) -> None:
+        from islands.report.figures.linear_system import draw_linear_system  # noqa: PLC0415
         from islands.report.figures.model_responses import draw_responses  # noqa: PLC0415
         from islands.report.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.report.figures.style import save  # noqa: PLC0415
@@ -312,6 +313,9 @@ class Result:
             drawn |= {name: partial(SEARCH_FIGURES[name], found) for name in search_figures(found)}
             drawn = {name: draw for name, draw in drawn.items() if name in names}
             responses = partial(draw_responses, model, found.split.estimation)
+        linear = [name for name in LINEAR_FIGURES if name in names]
+        if linear and (system := self.best.linear_system) is not None:
+            drawn |= {name: partial(draw_linear_system, system, name) for name in linear}
 
         def draw_one(name: str) -> None:
             save(drawn[name](), folder / f"{name}.svg")
@@ -335,7 +339,8 @@ class Result:
 
         path = Path(path)
         with TemporaryDirectory() as made:
-            path.write_bytes(report_saved_result(self.folder or self.save(Path(made) / path.stem)))
+            folder = self.folder or self.save(Path(made) / path.stem)
+            path.write_bytes(report_saved_result(folder, self.best.linear_system))
         return path
 
     @property

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
-from math import isfinite
+from math import ceil, isfinite
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -187,7 +187,8 @@ def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, An
         "kind": model.kind,
         "rank": rank,
         "recommended": rank == 1,
-        "size": model.size,
+        "size": ceil(entry.size),
+        "structure": entry.structure,
         "equation": written.named,
         "latex": written.latex,
         "signals": signals,

@@ -234,14 +234,21 @@ def _have_one_quotient(units: set[tuple[str, str]]) -> bool:
 
 
 def _mark_resonances(above: Axes, below: Axes, resonances: Sequence[tuple[float, float]], hertz: str) -> None:
-    """Mark the frequencies of resonances in both axes, with their damping ratios above."""
+    """Mark the frequencies of resonances in both axes, with their damping ratios above.
+
+    Outputs with the same poles have the same resonances, which are marked once.
+    """
     first, last = np.log(above.get_xlim())
-    for row, (frequency, damping) in enumerate(resonances):
+    marks = {
+        f"{frequency:.4g} {hertz}, damping ratio {damping:.3g}": frequency
+        for frequency, damping in resonances
+    }
+    for row, (text, frequency) in enumerate(marks.items()):
         place = float((np.log(frequency) - first) / (last - first))
         for axes in (above, below):
             axes.axvline(frequency, color=FRAME, lw=0.8, ls=":")
         above.annotate(
-            f"{frequency:.4g} {hertz}, damping ratio {damping:.3g}",
+            text,
             (frequency, 1.0),
             xytext=(0, 4 + 10 * row),
             xycoords=("data", "axes fraction"),

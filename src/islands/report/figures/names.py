@@ -17,8 +17,8 @@ LOOP = "loop"
 #: The figure of a latent model that needs units.
 CURVES = "curves"
 
-#: Figures of a latent model: block diagram, curves of the units, frequency response of the linear part.
-LATENT_FIGURES = ("structure", CURVES, "bode")
+#: Figures of a latent model: block diagram, curves of the units.
+LATENT_FIGURES = ("structure", CURVES)
 
 #: Figures of the linear system of a model about an operating point, which need no record.
 LINEAR_FIGURES = ("bode", "nyquist", "pole-map", "unit-step")
@@ -35,7 +35,7 @@ LEAST_ISLANDS: Mapping[str, int] = MappingProxyType({"convergence": 1, "islands"
 #: Responses of a model; of a model with several equilibria, as of hysteresis, there are none.
 RESPONSES = ("characteristic", "step-response")
 
-ALL_FIGURES = (*MODEL_FIGURES, *SEARCH_FIGURES, *RESPONSES)
+ALL_FIGURES = (*MODEL_FIGURES, *LINEAR_FIGURES, *SEARCH_FIGURES, *RESPONSES)
 
 #: The figure of a result that is drawn by default: measured output, free run with its band, and residual.
 OVERVIEW = (FREE_RUN,)

@@ -1,7 +1,6 @@
 """Tables of the figures of a model and of the figures of a search."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from math import isfinite
 from types import MappingProxyType
@@ -21,7 +20,6 @@ from islands.report.figures.convergence import draw_convergence, draw_front, dra
 from islands.report.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.report.figures.hysteresis import draw_holds, draw_loop, draw_loop_panel
 from islands.report.figures.latent import draw_structure, draw_unit_curves
-from islands.report.figures.linear_system import draw_bode
 from islands.report.figures.lines import break_line, downsample
 from islands.report.figures.names import FREE_RUN, LEAST_ISLANDS, LOOP
 from islands.report.figures.residuals import draw_residual_correlations
@@ -63,16 +61,9 @@ def _curves_on(model: DynamicModel, record: Dataset, warm_up: int, bands: Predic
     return draw_unit_curves(_require_latent(model), record, warm_up, ensemble)
 
 
-def _bode_on(model: DynamicModel, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
-    system = _require_latent(model).linearise()
-    return draw_bode(replace(system, input_units=record.input_units, output_units=(record.output_unit,)))
-
-
 def _require_latent(model: DynamicModel) -> LatentModel:
     if not isinstance(model, LatentModel):
-        raise ModelError(
-            f"the figures structure, curves and bode are of latent models, not of {model.kind} ones"
-        )
+        raise ModelError(f"the figures structure and curves are of latent models, not of {model.kind} ones")
     return model
 
 
@@ -88,7 +79,6 @@ RECORD_FIGURES: Mapping[str, RecordFigure] = MappingProxyType(
         "free-run": _free_run_on,
         "structure": _structure_on,
         "curves": _curves_on,
-        "bode": _bode_on,
         "loop": _loop_on,
         "hold": _hold_on,
         "residuals": _residuals_on,

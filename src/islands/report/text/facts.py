@@ -16,7 +16,7 @@ from islands.models.equations import name_columns
 from islands.records.preprocessing_steps import Preprocessing
 from islands.records.split import compare_input_ranges
 from islands.rounding import RESOLUTION
-from islands.sentences import write, write_amount
+from islands.sentences import list_statements, write, write_amount
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, NOT_COMPUTED
 from islands.validation.prediction_bands import LEVEL
 
@@ -81,6 +81,22 @@ BEFORE_REFIT = "measured before the parameters were estimated again on all data"
 #: Values of a JSON object.
 Document = Mapping[str, Any]
 
+#: Second word of the names of statements about one output.
+_EACH_OUTPUT = "_output_"
+
+#: What a statement is about, at its beginning.
+_LABEL: Final = re.compile(r"[A-Z][a-z ]+: ")
+
+#: Physics checks of a model that has none.
+_NO_PHYSICS: Final[Document] = {
+    "holds": (),
+    "excursions": (),
+    "extremes": (),
+    "property_1": None,
+    "hold_drift_percent": None,
+    "not_computed": "",
+}
+
 
 class DryFriction(NamedTuple):
     """Dry friction of a model of a velocity.
@@ -103,21 +119,44 @@ class RunFacts:
 
     Parameters
     ----------
-    metrics : mapping
-        Errors by part and simulation; null for a divergence.
-    unit : str
-        Unit of the output.
-    bands, residual, data : mapping
-        Prediction bands, residual tests and facts about the data; empty if they are unknown.
+    document : mapping
+        Content of ``result.json``.
+    model : mapping
+        Entry of the model in it.
+    name, unit : str
+        Name and unit of the output.
+    measured : mapping
+        Has the errors by part and simulation as ``metrics``, null for a divergence, and the prediction bands,
+        which may be null.
+    residual, data : mapping
+        Residual tests and facts about the data; empty if they are unknown.
     """
 
     #: Level of the prediction band.
     band = f"{100 * LEVEL:g} %"
 
+    #: Inclusion probability of a certain term, and largest predictable share of an adequate residual.
+    certain, largest_share = CERTAIN, LARGEST_SHARE
+
     def __init__(
-        self, metrics: Document, unit: str, bands: Document, residual: Document, data: Document
+        self,
+        document: Document,
+        model: Document,
+        name: str,
+        unit: str,
+        measured: Document,
+        residual: Document,
+        data: Document,
     ) -> None:
-        self.metrics, self.unit, self.bands, self.residual, self.data = metrics, unit, bands, residual, data
+        self.document, self.model, self.name, self.unit = document, model, name, unit
+        self.metrics: Document = measured["metrics"]
+        self.bands: Document = measured["bands"] or {}
+        self.residual, self.data = residual, data
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of the output, and of a result of one output those of the inputs."""
+        return (self.name,)
 
     def error(self, mode: str = "free_run", part: str = "validation") -> Document:
         """Return the errors of a simulation; null for a divergence."""
@@ -348,100 +387,15 @@ class RunFacts:
         """Whether the error on the validation data is much larger than that on the estimation data."""
         return self.error_ratio > _LARGE_RATIO
 
-
-class ResultFacts(RunFacts):
-    """Quantities of a ``result.json`` that the statements read.
-
-    Parameters
-    ----------
-    document : mapping
-        Content of ``result.json``.
-    """
-
-    #: Inclusion probability of a certain term, and largest predictable share of an adequate residual.
-    certain, largest_share = CERTAIN, LARGEST_SHARE
-
-    def __init__(self, document: Document) -> None:
-        self.document = document
-        self.record: Document = document["record"]
-        self.recommended: Document = document["recommended"]
-        self.model: Document = document["models"][self.recommended["rank"] - 1]
-        self.physics: Document = self.model["physics"]
-        model, unit = self.model, self.record["units"]["output"]
-        super().__init__(
-            model["metrics"], unit, model["bands"] or {}, model["residual_tests"], document["data"]
-        )
-
-    @cached_property
-    def limits(self) -> list[str]:
-        """Checks that the model fails."""
-        return write("result", "limit", f=self)
-
-    @property
-    def reasons(self) -> Sequence[str]:
-        """Reasons for the recommended model: why this one, and its physics checks."""
-        reasons: Sequence[str] = self.recommended["reasons"]
-        return reasons
-
-    @property
-    def physics_reason(self) -> str:
-        """What the physics checks of the model show; empty where they are not computed."""
-        return self.reasons[1] if len(self.reasons) > 1 else ""
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of the output and of every input in equations."""
-        columns = self.record["names"]
-        return name_columns(columns["output"], columns["inputs"])
-
-    @property
-    def requires_property_1(self) -> bool:
-        """Whether the search constrains the parameters of models of hysteresis."""
-        return "hysteresis" in self.document["settings"]["constraints"]
-
-    @property
-    def claims_hysteresis(self) -> bool:
-        """Whether the search is for models of hysteresis, or found a model with Property 1."""
-        models = self.document["models"]
-        return self.requires_property_1 or any(bool(entry["physics"]["property_1"]) for entry in models)
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether holds and excursions are bounded and, if required, Property 1 holds."""
-        tests = (*self.physics["holds"], *self.physics["excursions"])
-        bounded = all(test["bounded"] for test in tests)
-        return bounded and bool(self.physics["property_1"] or not self.requires_property_1)
-
     @property
     def criterion(self) -> Document:
         """Error that the parameters minimise. Empty if they are given."""
-        return self.model["criterion"] or {}
-
-    @property
-    def refit(self) -> Document:
-        """Estimate of the parameters on all data. Empty if there is none."""
-        return self.model["refit"] or {}
-
-    @property
-    def is_refitted(self) -> bool:
-        """Whether the parameters are others than those that the errors belong to."""
-        return is_refitted(self.model)
-
-    @property
-    def refit_note(self) -> str:
-        """What is added to an error on the validation data; empty without a refit."""
-        return BEFORE_REFIT if self.is_refitted else ""
-
-    @property
-    def recordings(self) -> Document:
-        """Errors of the free run by recording of the validation data; empty if there is one."""
-        errors: Document = self.model["recordings"]["validation"]
-        return errors
+        return self.model.get("criterion") or {}
 
     @property
     def linear(self) -> Document:
         """Linear model of the same data. Empty if the model is linear."""
-        return self.document["linear"] or {}
+        return self.document.get("linear") or {}
 
     @property
     def linear_error(self) -> float:
@@ -475,6 +429,174 @@ class ResultFacts(RunFacts):
         return bool(free is not None and one and not self.is_rounding(one) and free < _BETTER * one)
 
     @cached_property
+    def doubtful(self) -> list[tuple[str, float]]:
+        """Terms that are not certain, each with the probability of its inclusion."""
+        shares = [(term["term"], term["inclusion"]) for term in self.model["terms"]]
+        return [(text, share) for text, share in shares if share is not None and share < CERTAIN]
+
+    @property
+    def is_unpredictable_ahead(self) -> bool:
+        """Whether the error of the free run has a cause that the residual one step ahead does not show."""
+        return (self.has_structure or self.exceeds_noise) and not exceeds_limit(self.share("one_step_ahead"))
+
+    @property
+    def has_named_parameters(self) -> bool:
+        """Whether the models are of a class with named parameters in place of terms."""
+        return "kind" in self.model
+
+    @property
+    def has_searched_terms(self) -> bool:
+        """Whether terms of a library were searched; the recommended model may still be linear."""
+        return "library" in self.document["settings"]
+
+    @property
+    def is_free_run_untried(self) -> bool:
+        """Whether only the free run has structure, and the parameters minimise another error."""
+        return self.is_unpredictable_ahead and self.criterion.get("error", "free_run") != "free_run"
+
+    @property
+    def lacks_terms(self) -> bool:
+        """Whether the free run has structure, and the prediction one step ahead as well."""
+        return self.has_structure and exceeds_limit(self.share("one_step_ahead"))
+
+    @property
+    def worst_test(self) -> tuple[str, str]:
+        """Name and input of the residual test that exceeds its limit by most; of the first one if none does.
+
+        A test with an input is preferred: the residual of a slow record is correlated in time whatever term
+        is missing.
+        """
+        past, *tests = self.residual["tests"]
+        excess = [
+            test["largest"] / test["limit"] if test["largest"] and test["limit"] else 0.0 for test in tests
+        ]
+        worst = tests[excess.index(max(excess))] if max(excess) > 1.0 else past
+        return worst["name"], "" if worst["input"] is None else self.names[1 + worst["input"]]
+
+    @property
+    def wider_lags(self) -> tuple[str, int] | None:
+        """Setting of the lags of the library, and twice its value; None if they are unknown."""
+        settings = self.document["settings"]
+        name = next((name for name in ("lags", "library_lags") if name in settings), None)
+        return None if name is None else (name, 2 * settings[name])
+
+
+class ResultFacts(RunFacts):
+    """Quantities of a ``result.json`` that the statements read.
+
+    Parameters
+    ----------
+    document : mapping
+        Content of ``result.json``.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.record: Document = document["record"]
+        self.recommended: Document = document["recommended"]
+        model: Document = document["models"][self.recommended["rank"] - 1]
+        self.physics: Document = model.get("physics", _NO_PHYSICS)
+        name, unit = (self.record[key].get("output", "") for key in ("names", "units"))
+        measured = {"bands": None, **model}
+        residual = model.get("residual_tests", {})
+        super().__init__(document, model, name, unit, measured, residual, document["data"])
+
+    @property
+    def outputs(self) -> tuple[RunFacts, ...]:
+        """Facts about the free run of each output."""
+        return (self,)
+
+    def state(self, group: str) -> list[str]:
+        """Return the statements of a group about the model and, of those about an output, about each one."""
+        return [
+            line
+            for name in list_statements("result", group)
+            for line in (self._state_each(name) if _EACH_OUTPUT in name else write("result", name, f=self))
+        ]
+
+    def _state_each(self, name: str) -> list[str]:
+        """Return a statement about each output after its name, or once if it holds of all of them."""
+        stated: dict[str, list[str]] = {}
+        for output in self.outputs:
+            for line in write("result", name, f=output):
+                stated.setdefault(line, []).append(output.name)
+        return [
+            line if len(names) == len(self.outputs) else _name_statement(" and ".join(names), line)
+            for line, names in stated.items()
+        ]
+
+    @cached_property
+    def limits(self) -> list[str]:
+        """Checks that the model fails."""
+        return self.state("limit")
+
+    #: Modes and gains of a linear system whose parameters are coordinates of its states; may be empty.
+    quantities: Sequence[Document] = ()
+
+    @property
+    def columns(self) -> tuple[list[str], list[str]]:
+        """Names of the inputs and of the outputs."""
+        names = self.record["names"]
+        return names["inputs"], names.get("outputs") or [names["output"]]
+
+    @property
+    def reasons(self) -> Sequence[str]:
+        """Reasons for the recommended model: why this one, and its physics checks."""
+        reasons: Sequence[str] = self.recommended["reasons"]
+        return reasons
+
+    @property
+    def physics_reason(self) -> str:
+        """What the physics checks of the model show; empty where they are not computed."""
+        return self.reasons[1] if len(self.reasons) > 1 else ""
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the output and of every input in equations."""
+        columns = self.record["names"]
+        return name_columns(columns["output"], columns["inputs"])
+
+    @property
+    def requires_property_1(self) -> bool:
+        """Whether the search constrains the parameters of models of hysteresis."""
+        return "hysteresis" in self.document["settings"]["constraints"]
+
+    @property
+    def claims_hysteresis(self) -> bool:
+        """Whether the search is for models of hysteresis, or found a model with Property 1."""
+        models = self.document["models"]
+        return self.requires_property_1 or any(
+            bool(entry.get("physics", _NO_PHYSICS)["property_1"]) for entry in models
+        )
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether holds and excursions are bounded and, if required, Property 1 holds."""
+        tests = (*self.physics["holds"], *self.physics["excursions"])
+        bounded = all(test["bounded"] for test in tests)
+        return bounded and bool(self.physics["property_1"] or not self.requires_property_1)
+
+    @property
+    def refit(self) -> Document:
+        """Estimate of the parameters on all data. Empty if there is none."""
+        return self.model.get("refit") or {}
+
+    @property
+    def is_refitted(self) -> bool:
+        """Whether the parameters are others than those that the errors belong to."""
+        return is_refitted(self.model)
+
+    @property
+    def refit_note(self) -> str:
+        """What is added to an error on the validation data; empty without a refit."""
+        return BEFORE_REFIT if self.is_refitted else ""
+
+    @property
+    def recordings(self) -> Document:
+        """Errors of the free run by recording of the validation data; empty if there is one."""
+        errors: Document = self.model.get("recordings", {}).get("validation", {})
+        return errors
+
+    @cached_property
     def extrapolation(self) -> list[str]:
         """Inputs of the validation data that leave the range of the estimation data."""
         if "inputs" not in self.data:
@@ -492,11 +614,6 @@ class ResultFacts(RunFacts):
         """Whether the measured output is flat at an extreme, and the model is a difference equation."""
         limits = self.data.get("output_limits") or ()
         return "kind" not in self.model and any(each is not None for each in limits)
-
-    @property
-    def is_unpredictable_ahead(self) -> bool:
-        """Whether the error of the free run has a cause that the residual one step ahead does not show."""
-        return (self.has_structure or self.exceeds_noise) and not exceeds_limit(self.share("one_step_ahead"))
 
     @property
     def units(self) -> list[tuple[str, str]]:
@@ -536,22 +653,6 @@ class ResultFacts(RunFacts):
         return find_dry_friction(self.model["terms"], self.unit) if self.counts_samples else None
 
     @property
-    def has_named_parameters(self) -> bool:
-        """Whether the models are of a class with named parameters in place of terms."""
-        return "kind" in self.model
-
-    @property
-    def has_searched_terms(self) -> bool:
-        """Whether terms of a library were searched; the recommended model may still be linear."""
-        return "library" in self.document["settings"]
-
-    @cached_property
-    def doubtful(self) -> list[tuple[str, float]]:
-        """Terms that are not certain, each with the probability of its inclusion."""
-        shares = [(term["term"], term["inclusion"]) for term in self.model["terms"]]
-        return [(text, share) for text, share in shares if share is not None and share < CERTAIN]
-
-    @property
     def unlikely(self) -> tuple[str, float] | None:
         """The least probable term and its probability, if most of the weight is on models without it.
 
@@ -569,7 +670,7 @@ class ResultFacts(RunFacts):
     @property
     def constraints(self) -> list[tuple[str, Document]]:
         """Constraints of the user, with names of the record; the physics checks have Property 1."""
-        checks = [check for check in self.model["constraints"] if check["text"] != "hysteresis"]
+        checks = [check for check in self.model.get("constraints", ()) if check["text"] != "hysteresis"]
         return [(check["named"], check) for check in checks]
 
     @property
@@ -589,7 +690,7 @@ class ResultFacts(RunFacts):
     def missing_checks(self) -> list[str]:
         """Names of the checks that are not computed."""
         checks = {"physics checks": self.physics, "residual tests": self.residual}
-        return [name for name, each in checks.items() if each["not_computed"]]
+        return [name for name, each in checks.items() if each.get("not_computed")]
 
     @property
     def diverging(self) -> list[str]:
@@ -626,112 +727,53 @@ class ResultFacts(RunFacts):
         is_largest = self.model["size"] == self.largest_size
         return self.has_structure and is_largest and "max_terms" in self.document["settings"]
 
-    @property
-    def is_free_run_untried(self) -> bool:
-        """Whether only the free run has structure, and the parameters minimise another error."""
-        return self.is_unpredictable_ahead and self.criterion.get("error", "free_run") != "free_run"
-
-    @property
-    def lacks_terms(self) -> bool:
-        """Whether the free run has structure, and the prediction one step ahead as well."""
-        return self.has_structure and exceeds_limit(self.share("one_step_ahead"))
-
-    @property
-    def worst_test(self) -> tuple[str, str]:
-        """Name and input of the residual test that exceeds its limit by most; of the first one if none does.
-
-        A test with an input is preferred: the residual of a slow record is correlated in time whatever term
-        is missing.
-        """
-        past, *tests = self.residual["tests"]
-        excess = [
-            test["largest"] / test["limit"] if test["largest"] and test["limit"] else 0.0 for test in tests
-        ]
-        worst = tests[excess.index(max(excess))] if max(excess) > 1.0 else past
-        return worst["name"], "" if worst["input"] is None else self.names[1 + worst["input"]]
-
-    @property
-    def wider_lags(self) -> tuple[str, int] | None:
-        """Setting of the lags of the library, and twice its value; None if they are unknown."""
-        settings = self.document["settings"]
-        name = next((name for name in ("lags", "library_lags") if name in settings), None)
-        return None if name is None else (name, 2 * settings[name])
-
 
 class OutputFacts(RunFacts):
-    """Quantities of the common free run of one output.
-
-    Parameters
-    ----------
-    output : mapping
-        Entry of the output in ``result.json``.
-    """
-
-    def __init__(self, output: Document) -> None:
-        self.name: str = output["name"]
-        bands, residual = output["bands"] or {}, output["residual"]
-        super().__init__(output["metrics"], output["unit"], bands, residual, output["data"])
-
-
-class OutputsFacts:
-    """Quantities of a result of several outputs that the statements read.
+    """Quantities of the common free run of one of several outputs.
 
     Parameters
     ----------
     document : mapping
         Content of ``result.json``.
+    output : mapping
+        Entry of the output in it.
     """
 
+    def __init__(self, document: Document, output: Document) -> None:
+        (model,) = document["models"]
+        super().__init__(
+            document, model, output["name"], output["unit"], output, output["residual"], output["data"]
+        )
+
+    @property
+    def lacks_terms(self) -> bool:
+        """Whether its free run has structure; the estimate of an equation alone is no remedy."""
+        return self.has_structure and not (self.is_unpredictable_ahead and self.is_far_ahead)
+
+
+class OutputsFacts(ResultFacts):
+    """Quantities of a ``result.json`` of several outputs that the statements read."""
+
     def __init__(self, document: Document) -> None:
-        self.document = document
-        self.outputs = tuple(map(OutputFacts, document["outputs"]))
-
-    @property
-    def model(self) -> Document:
-        """Entry of the model, which a service stores apart from the rest."""
-        model: Document = self.document["models"][0]
-        return model
-
-    @property
-    def is_latent(self) -> bool:
-        """Whether every output has a latent model from a separate search."""
-        return bool(self.model.get("kind") == CoupledLatentModel.kind)
-
-    @property
-    def quantities(self) -> Sequence[Document]:
-        """Modes and gains of a linear system whose parameters are coordinates of its states; may be empty."""
-        found: Sequence[Document] = self.model.get("quantities", ())
-        return found
-
-    @property
-    def shared_states(self) -> int:
-        """Number of states that all outputs share; 0 without such states."""
-        return int(self.model.get("shared_states", 0))
-
-    @property
-    def reasons(self) -> Sequence[str]:
-        """Why the model is recommended; empty if it was compared with no other one."""
-        found: Sequence[str] = self.document["recommended"]["reasons"]
-        return found
-
-    @property
-    def columns(self) -> tuple[list[str], list[str]]:
-        """Names of the inputs and of the outputs."""
-        names = self.document["record"]["names"]
-        return names["inputs"], names["outputs"]
+        super().__init__(document)
+        self.quantities = self.model.get("quantities", ())
 
     @cached_property
-    def extrapolation(self) -> list[str]:
-        """Inputs of the validation data that leave the range of the estimation data."""
-        record, ranges = self.document["record"], self.document["data"]["inputs"]
-        columns = record["names"]["inputs"], record["units"]["inputs"]
-        return compare_input_ranges(*columns, ranges["estimation"], ranges["validation"])
+    def outputs(self) -> tuple[RunFacts, ...]:
+        """Facts about the common free run of each output."""
+        return tuple(OutputFacts(self.document, each) for each in self.document["outputs"])
 
-    @cached_property
-    def limits(self) -> list[str]:
-        """Checks that an output or the model fails. A divergence of the free run concerns every output."""
-        failed = [text for each in self.outputs for text in write("outputs", "limit", output=each)]
-        return list(dict.fromkeys([*failed, *write("outputs", "extrapolation", f=self)]))
+    @property
+    def has_named_parameters(self) -> bool:
+        """Whether the models of the outputs have named parameters in place of terms."""
+        return bool(self.model["kind"] == CoupledLatentModel.kind)
+
+    @property
+    def units(self) -> list[tuple[str, str]]:
+        """Names of the columns that have a unit, with it."""
+        units, (inputs, outputs) = self.record["units"], self.columns
+        pairs = zip((*outputs, *inputs), (*units["outputs"], *units["inputs"]), strict=True)
+        return [(name, unit) for name, unit in pairs if unit]
 
     @property
     def simulates(self) -> bool:
@@ -754,19 +796,25 @@ class OutputsFacts:
         return any(output.generalises_poorly for output in self.outputs)
 
     @property
-    def structured(self) -> list[OutputFacts]:
-        """Outputs of which a part of the residual is predictable."""
-        return [output for output in self.outputs if output.has_structure]
+    def is_unrelated(self) -> bool:
+        """Whether nothing predicts any of the outputs."""
+        return all(output.is_unrelated for output in self.outputs)
 
     @property
-    def adequate(self) -> list[OutputFacts]:
-        """Outputs in whose residual no structure is left."""
-        return [output for output in self.outputs if output.is_unpredictable and not output.exceeds_noise]
+    def may_grow(self) -> bool:
+        """False: the terms of all outputs are counted together."""
+        return False
 
-    @cached_property
-    def insignificant(self) -> list[str]:
-        """Terms whose parameters are within two standard errors of zero."""
-        return list_insignificant(self.model["terms"])
+
+def make_facts(document: Document) -> ResultFacts:
+    """Return the facts of a ``result.json`` of one or several outputs."""
+    return (OutputsFacts if "outputs" in document else ResultFacts)(document)
+
+
+def _name_statement(name: str, line: str) -> str:
+    """Return a statement after the name of the output that it is about: ``y1, error: RMSE 2 um``."""
+    is_labelled = _LABEL.match(line)
+    return f"{name}, {line[0].lower()}{line[1:]}" if is_labelled else f"{name}: {line}"
 
 
 def exceeds_limit(share: float | None) -> bool:

@@ -4,40 +4,29 @@ A run, its folder, the REST service, the page, the report and a notebook state t
 """
 
 from islands.report.text.diagnosis_facts import DiagnosisFacts
-from islands.report.text.facts import Document, OutputsFacts, ResultFacts
+from islands.report.text.facts import Document, make_facts
 from islands.sentences import write, write_named, write_one
 
 
 def describe(document: Document) -> list[str]:
     """Describe the recommended model in sentences: its essence, the equation, and further findings.
 
-    The equation and the units are indented.
+    The equation and the units are indented. A linear system whose parameters are coordinates of its states
+    has no equation that a reader could use.
 
     Parameters
     ----------
     document : mapping
         Content of ``result.json``.
     """
-    if "outputs" in document:
-        return _describe_outputs(document)
-    facts = ResultFacts(document)
+    facts = make_facts(document)
+    equation = "" if facts.quantities else "; ".join(facts.model["equation"].splitlines())
     return [
-        *write("result", "essence", f=facts),
+        *facts.state("essence"),
         write_one("result", "choice", f=facts),
-        f"    {facts.model['equation']}",
+        *([f"    {equation}"] if equation else []),
         f"    {write_one('result', 'units', f=facts)}",
-        *write("result", "finding", f=facts),
-    ]
-
-
-def _describe_outputs(document: Document) -> list[str]:
-    """Describe the model of several outputs in sentences; its equations are indented."""
-    facts = OutputsFacts(document)
-    return [
-        *write("outputs", "essence", f=facts),
-        write_one("outputs", "equations", f=facts),
-        *([] if facts.quantities else [f"    {'; '.join(facts.model['equation'].splitlines())}"]),
-        *write("outputs", "finding", f=facts),
+        *facts.state("finding"),
     ]
 
 

@@ -9,17 +9,17 @@ from islands.evolution.latent_variation import EFFECT_STEPS, FURTHER_STEPS, MOST
 from islands.evolution.search_result import SearchResult
 from islands.evolution.settings import LATENT
 from islands.models.coupled_latent import CoupledLatentModel
-from islands.models.coupled_narx import AnyModel, CoupledModel, coupled_signals
+from islands.models.coupled_narx import AnyModel, CoupledModel, list_models
 from islands.models.equations import named_signals
 from islands.models.latent import STRUCTURE_SUMMARIES, LatentModel
 from islands.models.linearisation import find_rest
 from islands.models.measured_signals import measured_block
 from islands.models.narx import Model
 from islands.persistence.saved_documents import find_recommended
-from islands.report.text.facts import Document, OutputFacts, OutputsFacts, ResultFacts
+from islands.report.text.facts import Document, ResultFacts, make_facts
 from islands.report.text.layout import LEGEND, MARK, term_table, wrap
 from islands.report.text.mode_tables import GAINS, MODES, align, list_gains, list_modes
-from islands.sentences import write, write_named, write_one
+from islands.sentences import write, write_one
 from islands.validation.assessment import PARTS
 
 #: Columns of every table.
@@ -39,71 +39,35 @@ def summary(document: Document, model: AnyModel) -> str:
     model : DynamicModel or CoupledModel
         The recommended model.
     """
-    if isinstance(model, CoupledModel):
-        return _summarise_outputs(document, model)
-    facts = ResultFacts(document)
+    facts = make_facts(document)
     lines = [
-        *(line for sentence in write("result", "essence", f=facts) for line in wrap(sentence)),
+        *(line for sentence in facts.state("essence") for line in wrap(sentence)),
         "",
         *wrap(write_one("result", "choice", f=facts)),
         "",
-        *term_table(model),
+        *_list_parameters(facts, model),
         *_describe_linear_part(document, model),
         "",
         *wrap(write_one("result", "units", f=facts)),
-        *(line for sentence in write("result", "finding", f=facts) for line in wrap(sentence)),
+        *(line for sentence in facts.state("finding") for line in wrap(sentence)),
         "",
         *table(facts),
-        LEGEND,
+        *([] if facts.outputs[1:] else [LEGEND]),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _summarise_outputs(document: Document, model: CoupledModel) -> str:
-    """Return the summary of a result of several outputs; their errors are in a table."""
-    facts = OutputsFacts(document)
-    named = dict(write_named("outputs", "essence", f=facts))
-    linear = _describe_linear_part(document, model)
-    head = [text for name, text in named.items() if name != "essence_errors"]
-    signals = coupled_signals(model) or f"k counts samples of {document['preprocessing']['dt']:g} s"
-    lines = [
-        *(line for text in head for part in text.splitlines() for line in wrap(part)),
-        "",
-        *wrap(write_one("outputs", "equations", f=facts)),
-        "",
-        *_list_equations(facts, model),
-        *linear,
-        *([""] if linear else []),
-        *wrap(f"{signals}."),
-        "",
-        "Validation data; all outputs are simulated together, from the inputs alone:",
-        f"{'output':20} {'free-run RMSE':>18} {'% of range':>10} {'R2':>8} {'one-step RMSE':>18}",
-        *map(_describe_output, facts.outputs),
-        "",
-        *(line for text in write("outputs", "finding", f=facts) for line in wrap(text)),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _list_equations(facts: OutputsFacts, model: CoupledModel) -> list[str]:
-    """Return the modes and gains of a model whose parameters are coordinates of its states, or its terms."""
+def _list_parameters(facts: ResultFacts, model: AnyModel) -> list[str]:
+    """Return the terms of each equation, or the modes and gains of coordinates of states."""
     if not facts.quantities:
-        return [line for single in model.models for line in [*term_table(single), ""]]
+        tables = [term_table(single) for single in list_models(model)]
+        return [line for each in tables for line in ["", *each]][1:]
     modes, gains = list_modes(facts.quantities), list_gains(facts.quantities, *facts.columns)
-    return [*align(MODES, modes), "", *align(GAINS, gains), ""]
-
-
-def _describe_output(output: OutputFacts) -> str:
-    """Return the errors of an output on the validation data as a row of the summary."""
-    free, ahead = (output.error(mode, "validation") for mode in ("free_run", "one_step_ahead"))
-    unit = f" {output.unit}".rstrip()
-    errors = [number(each["rmse"], "{:.4g}" + unit, each["rmse"] is not None) for each in (free, ahead)]
-    percent, r2 = (number(free[key], form, True) for key, form in (("mape", "{:.3g}"), ("r2", "{:.4f}")))
-    return f"{output.name:20} {errors[0]:>18} {percent:>10} {r2:>8} {errors[1]:>18}"
+    return [*align(MODES, modes), "", *align(GAINS, gains)]
 
 
 def table(facts: ResultFacts) -> list[str]:
-    """Return the table of models as lines of equal width, with free-run errors."""
+    """Return the table of models, or of several outputs, as lines of equal width, with free-run errors."""
     lines = [columns(facts), *rows(facts)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
@@ -112,6 +76,8 @@ def table(facts: ResultFacts) -> list[str]:
 def columns(facts: ResultFacts) -> tuple[str, ...]:
     """Return the headings; those of holds only if a model claims hysteresis."""
     rank, size, *errors, residuals = _COLUMNS
+    if facts.outputs[1:]:
+        return "output", *errors, residuals
     counted = ("form", "parameters") if _has_forms(facts) else (size,)
     return rank, *counted, *errors, *(_HYSTERESIS_COLUMNS if facts.claims_hysteresis else ()), residuals
 
@@ -122,34 +88,33 @@ def _has_forms(facts: ResultFacts) -> bool:
 
 
 def rows(facts: ResultFacts) -> list[tuple[str, ...]]:
-    """Return the cells of every model, in the order of the ranks."""
+    """Return the cells of every model, in the order of the ranks, or of each of several outputs."""
+    if facts.outputs[1:]:
+        return [(each.name, *_list_errors(each.metrics), each.verdict) for each in facts.outputs]
     has_forms = _has_forms(facts)
     return [
-        _row(
-            (
-                f"{entry['rank']}{MARK if entry['recommended'] else ' '}",
-                *([entry.get("form", "")] if has_forms else []),
-            ),
-            entry,
-            facts.claims_hysteresis,
+        (
+            f"{entry['rank']}{MARK if entry['recommended'] else ' '}",
+            *([entry.get("form", "")] if has_forms else []),
+            str(entry["size"]),
+            *_list_errors(entry["metrics"]),
+            *(_describe_claims(entry["physics"]) if facts.claims_hysteresis else ()),
+            entry["residual_tests"]["verdict"],
         )
         for entry in facts.document["models"]
     ]
 
 
-def _row(first: tuple[str, ...], entry: Document, hysteresis: bool) -> tuple[str, ...]:
-    metrics = entry["metrics"]
-    estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
-    estimated, validated = (entry["outcomes"][part]["free_run"] == "ok" for part in PARTS)
-    return (
-        *first,
-        str(entry["size"]),
-        number(estimation["mape"], "{:.4f}", estimated),
-        number(validation["mape"], "{:.4f}", validated),
-        number(validation["r2"], "{:.5f}", validated),
-        *(_describe_claims(entry["physics"]) if hysteresis else ()),
-        entry["residual_tests"]["verdict"],
-    )
+def _list_errors(metrics: Document) -> list[str]:
+    estimation, validation = (metrics[part]["free_run"] for part in PARTS)
+    return [
+        number(each[key], form, each["rmse"] is not None)
+        for each, key, form in (
+            (estimation, "mape", "{:.4f}"),
+            (validation, "mape", "{:.4f}"),
+            (validation, "r2", "{:.5f}"),
+        )
+    ]
 
 
 def _describe_claims(physics: Document) -> tuple[str, str]:

@@ -89,7 +89,7 @@ def test_a_saved_result_is_read_with_the_same_simulation(found, tmp_path) -> Non
     assert str(loaded) == str(found) == (folder / "summary.txt").read_text()
     data = found.best.validation
     np.testing.assert_array_equal(loaded.bands(data).lower, found.bands(data).lower)
-    assert "The model of 2 outputs simulates" in loaded.report(tmp_path / "report.html").read_text()
+    assert "terms simulates y1 with a" in loaded.report(tmp_path / "report.html").read_text()
     document = json.loads((folder / "result.json").read_text())
     assert [each["name"] for each in document["outputs"]] == ["y1", "y2"]
     for number, each in enumerate(document["outputs"], start=1):

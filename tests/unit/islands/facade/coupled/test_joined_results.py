@@ -39,7 +39,7 @@ def test_a_saved_result_is_read_with_the_same_bands(found, tmp_path):
     document = json.loads((folder / "result.json").read_text())
     assert document["ensemble"] is None
     assert all(each["ensemble"] for each in document["outputs"])
-    assert "each model is from a separate search" in " ".join(str(loaded).split())
+    assert "size 18 (one latent model for each output)" in " ".join(str(loaded).split())
     assert loaded.outputs[1].best.model.units == found.outputs[1].best.model.units
 
 

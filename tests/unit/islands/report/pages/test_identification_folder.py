@@ -39,8 +39,9 @@ def test_report_of_several_outputs_has_the_equations_and_the_free_run_of_each(tm
     for number in (1, 2):
         (tmp_path / f"figures/free-run-{number}.svg").write_bytes(b"<svg/>")
     page = report_saved_result(tmp_path).decode()
-    assert "The model of 2 outputs simulates" in page
+    assert "terms simulates y1 with a mean absolute error" in page
     assert page.count("<img ") == 2
+    assert report_saved_result(tmp_path, result.best.linear_system).decode().count("<img ") == 5
 
 
 def test_report_of_a_diagnosis_is_the_one_that_it_wrote(tmp_path):
