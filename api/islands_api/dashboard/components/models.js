@@ -77,11 +77,12 @@ function makeRank(job, { rank, recommended }) {
   return el("a", { href: `#/jobs/${job}/models/${rank}`, "aria-label": name }, String(rank));
 }
 
-function makeRow(job, model, hysteresis) {
+function makeRow(job, model, hysteresis, hasForms) {
   const { physics, recommended, residual_tests: residuals } = model;
   const mark = recommended ? el("span", { class: "recommended" }, " recommended") : "";
   return [
     el("span", {}, makeRank(job, model), mark),
+    ...(hasForms ? [model.form] : []),
     String(model.size),
     ...makeMetrics(model),
     ...(hysteresis ? makeHysteresisCells(physics) : []),
@@ -96,9 +97,11 @@ function makeModelTable(job, models) {
   const hysteresis = claimHysteresis(models);
   const size = nameSize(models.find(({ kind }) => kind)?.kind);
   const further = hysteresis ? HYSTERESIS_HEADINGS : [];
-  const names = ["Rank", size, ...ERRORS, ...further, "Free-run residual"];
-  const headings = names.map((name, at) => [name, at === 0 ? null : "figure"]);
-  const rows = models.map((model) => makeRow(job, model, hysteresis));
+  // Of a library that the user names, all models may be equations.
+  const hasForms = models.some(({ kind }) => kind);
+  const names = [size, ...ERRORS, ...further, "Free-run residual"];
+  const headings = ["Rank", ...(hasForms ? ["Form"] : []), ...names.map((name) => [name, "figure"])];
+  const rows = models.map((model) => makeRow(job, model, hysteresis, hasForms));
   const modelTable = makeTable("Models, least error on the validation data first", headings, rows);
   modelTable.classList.add("models");
   return modelTable;
