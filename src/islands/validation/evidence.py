@@ -41,6 +41,16 @@ def name_form(model: AnyModel) -> str:
     return "equation"
 
 
+def reads_inputs(model: AnyModel) -> bool:
+    """Return whether the output of a model depends on an input."""
+    if isinstance(model, CoupledModel):
+        return any(map(reads_inputs, model.models))
+    if isinstance(model, LatentModel):
+        blocks = model.layout.split(model.theta)
+        return any(block.any() for block in (blocks["B"], blocks["D"], blocks["W"][:, model.order :]))
+    return isinstance(model, Model) and any(channel for item in model.regressors for channel, _ in item.lags)
+
+
 def measure_size(model: AnyModel) -> float:
     """Return the number of terms by which models are compared; a constant is half a term.
 

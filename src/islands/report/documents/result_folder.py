@@ -48,7 +48,7 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
-from islands.validation.evidence import is_linear, name_form
+from islands.validation.evidence import is_linear, name_form, reads_inputs
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure, missing_structure
@@ -158,6 +158,7 @@ def _output_document(place: int, entry: CoupledAssessment, steps: Steps) -> dict
         "unit": validation.output_unit,
         "folder": list_folders(entry.model.output_names)[place],
         "rank": entry.ranks[place] if entry.ranks else None,
+        "reads_inputs": reads_inputs(entry.model.models[place]),
         "bands": bands_document(bands),
         **({"ensemble": ensemble_document(bands.ensemble)} if own and bands else {}),
         "data": {
@@ -176,7 +177,8 @@ def _output_document(place: int, entry: CoupledAssessment, steps: Steps) -> dict
 def _describe_size(model: DynamicModel) -> dict[str, Any]:
     """Return form and number of free parameters of a model, and the structure of a state space."""
     structure = {"structure": model.structure} if isinstance(model, LatentModel) else {}
-    return {"form": name_form(model), "size": model.free_size, **structure}
+    form = {"form": name_form(model), "reads_inputs": reads_inputs(model)}
+    return {**form, "size": model.free_size, **structure}
 
 
 def _coupled_model_document(rank: int, entry: CoupledAssessment) -> dict[str, Any]:

@@ -151,12 +151,19 @@ class RunFacts:
         self.document, self.model, self.name, self.unit = document, model, name, unit
         self.metrics: Document = measured["metrics"]
         self.bands: Document = measured["bands"] or {}
+        self.reads_inputs: bool = measured.get("reads_inputs", True)
         self.residual, self.data = residual, data
 
     @property
     def names(self) -> tuple[str, ...]:
         """Name of the output, and of a result of one output those of the inputs."""
         return (self.name,)
+
+    @property
+    def input_names(self) -> Sequence[str]:
+        """Names of the columns of the inputs."""
+        found: Sequence[str] = self.document["record"]["names"]["inputs"]
+        return found
 
     def error(self, mode: str = "free_run", part: str = "validation") -> Document:
         """Return the errors of a simulation; null for a divergence."""
@@ -276,8 +283,8 @@ class RunFacts:
 
     @property
     def is_unrelated(self) -> bool:
-        """Whether the free run is hardly better than the mean of an output that nothing predicts."""
-        return self.explained is not None and self.explained < _NO_R2 and self.is_unpredictable
+        """Whether no model that reads an input has decisively more evidence than one that reads none."""
+        return not self.reads_inputs
 
     @property
     def rests(self) -> bool:

@@ -236,3 +236,12 @@ def test_a_law_that_fails_the_physics_checks_is_recommended_if_the_data_say_so(s
     assert physics.startswith("the data contradict the physics checks")
     lines = describe(result_document(found.search_result))
     assert any(line.startswith(f"Fails at: {physics};") for line in lines)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", [0, 1])
+def test_an_output_that_does_not_depend_on_the_inputs_has_no_model(seed):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 30), 20)
+    found = islands.fit(islands.Dataset(u, 5.0 + rng.standard_normal(600), 0.1, ("u_V",), "y_mm"))
+    assert "No model found: y_mm does not depend on u_V" in " ".join(str(found).split())

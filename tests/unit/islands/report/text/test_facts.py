@@ -114,14 +114,7 @@ RESULTS = {
         {"models.0.constraints": [CHECK | {"met": False}, CHECK | {"met": False, "value": None}]}
     ],
     "limit_output_no_simulation": [LOST],
-    "limit_output_unrelated": [
-        WHITE
-        | {
-            f"{METRICS}.free_run.r2": -0.01,
-            "models.0.metrics.estimation.free_run.r2": -0.01,
-            "data.noise": None,
-        }
-    ],
+    "limit_output_unrelated": [{"models.0.reads_inputs": False}],
     "limit_output_at_rest": [{f"{METRICS}.free_run.r2": -0.01}],
     "limit_output_poor_simulation": [{f"{METRICS}.free_run.r2": 0.3, f"{METRICS}.free_run.rmse": 1.0}],
     "limit_diverging_excursions": [{"models.0.physics.excursions.0.bounded": False}],
