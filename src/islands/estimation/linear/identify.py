@@ -12,7 +12,14 @@ from threadpoolctl import threadpool_limits
 from islands.errors import RecordError
 from islands.estimation.linear.model import LinearCandidate, LinearModel, Scales, make_model
 from islands.estimation.linear.noise import WHITE, fit_noises
-from islands.estimation.linear.reduction import Reduced, reduce_model, sample_fit, sample_high_order
+from islands.estimation.linear.reduction import (
+    Reduced,
+    Response,
+    reduce_inputs,
+    reduce_model,
+    sample_fit,
+    sample_high_order,
+)
 from islands.estimation.linear.regression import (
     Fit,
     Mode,
@@ -271,6 +278,7 @@ class Search:
         if self.high is not None:
             response = sample_high_order(self.signals, self.high)
             small = list(reduce_model(response, range(2, min(_GROUP, self.max_order) + 1)))
+            small += self._reduce_inputs(response, np.zeros(shape[1], np.int64))
             self.steps.check("linear models of several orders")
             # Many modes are a sum, whose zeros are all free.
             large = list(reduce_model(response, range(_GROUP + 1, self.max_order + 1), excess=1))
@@ -279,15 +287,26 @@ class Search:
                 self._keep_reduced(large)
         self._grow()
         best = self.best.structure
-        orders = range(max(best.order - 2, 1), min(best.order + 1, self.max_order) + 1)
+        orders = range(1, min(best.order + 1, self.max_order) + 1)
         if best.order > 1:
-            self._keep_reduced(reduce_model(sample_fit(self.best), orders, best.integrators))
+            response = sample_fit(self.best)
+            driven = best.drives[:, :, len(best.sections) :].any(axis=(0, 2))
+            integrating = np.where(driven, best.integrators, 0)
+            reduced = [*reduce_model(response, orders, best.integrators)]
+            reduced += self._reduce_inputs(response, integrating)
+            self._keep_reduced(reduced)
         return [self.fits[order] for order in sorted(self.fits)]
+
+    def _reduce_inputs(self, response: Response, integrators: NDArray[np.int64]) -> Iterator[Reduced]:
+        """Yield transfer functions of several inputs that have poles of their own."""
+        inputs = len(self.signals.u)
+        if inputs > 1:
+            orders = range(1, min(_GROUP, self.max_order) // inputs + 1)
+            yield from reduce_inputs(response, orders, integrators, float(np.log(self.signals.samples)))
 
     def _expect(self, reduced: Reduced) -> float:
         """Return the criterion that is expected of a transfer function, up to a constant."""
-        count = reduced.poles.size + self.best.structure.delays.size * reduced.zeros
-        return reduced.loss + float(np.log(self.signals.samples)) * count
+        return reduced.loss + float(np.log(self.signals.samples)) * reduced.size
 
     def _keep_reduced(self, reduced: Iterable[Reduced]) -> None:
         """Keep the most promising fits that begin with transfer functions."""
@@ -313,11 +332,16 @@ class Search:
         every = np.ones(shape, bool)
         # A direct path is no response of the modes.
         direct = ~every if self.high is None else self.high.leads
-        modes = [Mode(complex(np.exp(pole)), every) for pole in reduced.poles if pole.imag >= 0.0]
-        integrators = np.ones((*shape, min(reduced.integrators, 1)), bool)
-        bare = replace(best, sections=(), integrators=reduced.integrators, drives=integrators)
-        excess = np.where(direct, 1, reduced.order - reduced.zeros)
-        delays = np.where(direct, 0, reduced.delays)
+        modes = [
+            Mode(complex(np.exp(pole)), reduced.drives[:, :, place])
+            for place, pole in enumerate(reduced.poles)
+            if pole.imag >= 0.0
+        ]
+        integrators = int(reduced.integrators.max(initial=0))
+        integrating = np.repeat(reduced.integrators[:, :, None] > 0, min(integrators, 1), axis=2)
+        bare = replace(best, sections=(), integrators=integrators, drives=integrating)
+        excess = np.where(direct, 1, reduced.excess)
+        delays = np.where(direct, 0, np.minimum(reduced.delays, self.longest - 1))
         for leads in (direct, every):
             start = bare.take(modes, excess=excess, delays=delays + (leads & ~direct), leads=leads)
             yield replace(start, rests=True, before=self.signals.first)
@@ -385,7 +409,9 @@ class Search:
         while improved:
             self.steps(f"changes of the linear model of order {fit.structure.order}")
             improved, rivals = False, []
-            tried = [project(self.signals, each) for each in self._list_neighbours(fit)]
+            others = {each.key: each for each in self._list_neighbours(fit)}
+            others.pop(fit.structure.key, None)
+            tried = [project(self.signals, each) for each in others.values() if self._is_causal(each)]
             for start in sorted(filter(None, tried), key=partial(predict, self.signals))[:_NEIGHBOURS]:
                 found = minimise(self.signals, start, 15, 0.1)
                 # An order that is too large hides a wrong dead time, and wrong inputs before the recordings.
@@ -408,6 +434,8 @@ class Search:
         if structure.order == 0:
             return
         yield replace(structure, rests=not structure.rests, before=self.signals.first)
+        if structure.before is not None:
+            yield replace(structure, rests=not structure.rests)
         yield from self._list_smaller(structure)
         yield from self._list_integrators(structure)
         yield from self._list_larger(structure)
@@ -415,22 +443,48 @@ class Search:
         yield from self._list_delays(structure)
 
     def _list_smaller(self, structure: Structure) -> Iterator[Structure]:
-        """Yield structures without a mode."""
-        modes = structure.modes
+        """Yield structures without a mode, whose lag may become a dead time."""
+        modes, early = structure.modes, structure.fractions * structure.leads
         for place, mode in enumerate(modes):
             left = [*modes[:place], *modes[place + 1 :]]
-            size = 2 if mode.pole.imag > 0.0 else 1
             smaller = structure.take(left)
-            yield smaller
-            if (structure.excess > 1).any():
-                yield replace(smaller, excess=np.maximum(structure.excess - size * mode.drives, 1))
             # A mode may describe the response to other inputs before the recordings.
             if structure.before is not None and structure.delays.any():
                 yield replace(smaller, before=None, rests=False)
-            # With a pole near 0, an order reads the lags of the order below and a fraction.
-            if left:
-                delays = structure.delays + ~structure.leads
-                yield replace(smaller, leads=np.ones_like(structure.leads), delays=delays)
+            size = 2 if mode.pole.imag > 0.0 else 1
+            lag = (
+                0.0 if mode.pole == 0.0 else min(-size * (1.0 / np.log(mode.pole)).real, float(self.longest))
+            )
+            late = structure.delays + lag * mode.drives
+            leads = structure.leads | mode.drives
+            fractions = np.where(leads, np.ceil(late - early) - late + early, structure.fractions)
+            for excess in (structure.excess, np.maximum(structure.excess - size * mode.drives, 1)):
+                yield replace(smaller, excess=excess)
+                if left:
+                    yield replace(smaller, excess=excess, delays=np.rint(late).astype(np.int64))
+                    delays = np.ceil(late - early).astype(np.int64)
+                    yield replace(smaller, excess=excess, delays=delays, leads=leads, fractions=fractions)
+        yield from self._list_shared(structure)
+
+    def _list_shared(self, structure: Structure) -> Iterator[Structure]:
+        """Yield structures where a mode of some inputs and the nearest one of others are the same, or not."""
+        modes = structure.modes
+        for place, mode in enumerate(modes):
+            left = [*modes[:place], *modes[place + 1 :]]
+            others = [
+                each
+                for each in left
+                if (each.pole.imag > 0.0) == (mode.pole.imag > 0.0) and not (each.drives & mode.drives).any()
+            ]
+            if others:
+                near = min(others, key=lambda other: abs(other.pole - mode.pole))
+                joined = Mode(0.5 * (mode.pole + near.pole), mode.drives | near.drives)
+                yield structure.take([*(each for each in left if each is not near), joined])
+            inputs = np.flatnonzero(mode.drives.any(axis=0))
+            size = 2 if mode.pole.imag > 0.0 else 1
+            if inputs.size > 1 and structure.order + size * (inputs.size - 1) <= self.max_order:
+                masks = mode.drives & np.eye(mode.drives.shape[1], dtype=bool)[inputs][:, None]
+                yield structure.take([*left, *(Mode(mode.pole, mask) for mask in masks)])
 
     def _list_integrators(self, structure: Structure) -> Iterator[Structure]:
         """Yield structures with an integrator in place of the slowest mode, and the other way round."""
@@ -487,19 +541,17 @@ class Search:
             for change in (-1, 1, -int(structure.delays[place])):
                 delays = structure.delays.copy()
                 delays[place] += change
-                if self._is_causal(structure.leads, delays):
-                    yield replace(structure, delays=delays)
+                yield replace(structure, delays=delays)
             for change in (-1, 0) if structure.leads[place] else (0, 1):
                 leads, delays = structure.leads.copy(), structure.delays.copy()
                 leads[place] = not leads[place]
                 delays[place] += change
-                if self._is_causal(leads, delays):
-                    yield replace(structure, leads=leads, delays=delays)
+                yield replace(structure, leads=leads, delays=delays)
 
-    def _is_causal(self, leads: NDArray[np.bool_], delays: NDArray[np.int64]) -> bool:
+    def _is_causal(self, structure: Structure) -> bool:
         """Return whether no output reads a later input, nor one of the same sample without a direct path."""
-        least = 0 if self.feedthrough else leads
-        return bool((delays >= least).all() and (delays <= self.longest).all())
+        least = 0 if self.feedthrough else structure.leads
+        return bool((structure.delays >= least).all() and (structure.delays <= self.longest).all())
 
     def _place(self, fit: Fit) -> list[Fit]:
         """Return fits with a few dead times of every input, one after the other from the best one so far."""
@@ -562,7 +614,8 @@ class Search:
         """Return values of the inputs before the recordings: unknown, the first ones, and constant ones."""
         if not fit.structure.delays.any():
             return []
-        levels = self.signals.first.copy()
+        now = fit.structure.before
+        levels = np.array(self.signals.first if now is None else now)
         places = np.argwhere(fit.structure.delays.any(axis=0) & np.ones(levels.shape, bool))
         for place in [*places] * _LEVEL_STEPS:
             change, squares = np.zeros_like(levels), []
@@ -574,7 +627,7 @@ class Search:
             curvature = above - 2.0 * here + below
             if np.isfinite(curvature) and curvature > 0.0:
                 levels[tuple(place)] += 0.5 * (below - above) / curvature
-        known, now = [self.signals.first, levels], fit.structure.before
+        known = [self.signals.first, levels]
         if now is None:
             return [*known]
         return [None, *(each for each in known if not np.array_equal(each, now))]

@@ -148,8 +148,11 @@ class LinearModel:
                 x = np.linalg.lstsq(np.eye(self.order) - self.a, b @ late[0] + drift, rcond=1e-12)[0]
             else:
                 x = np.array(start[output], dtype=np.float64)
-            theta = np.concatenate([self.a.ravel(), b.ravel(), self.c, d, drift, [level]])
-            simulate_state_space(theta, codes, late, x, y[output])
+            # A simulation ends at large states; they add up an input at most once for each sample.
+            growth = len(u) * (np.abs(b) @ np.abs(late).max(axis=0) + np.abs(drift))
+            unit = float(np.maximum(growth, np.abs(x)).max(initial=0.0)) or 1.0
+            parts = self.a.ravel(), b.ravel() / unit, self.c * unit, d, drift / unit, [level]
+            simulate_state_space(np.concatenate(parts), codes, late, x / unit, y[output])
         return y.T
 
 

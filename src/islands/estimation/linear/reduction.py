@@ -5,7 +5,8 @@ the coefficients (Sanathanan & Koerner 1963). Partial fractions of the poles bef
 (Gustavsen & Semlyen 1999). The weights are those of the deviance that the difference of the models costs.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,10 +22,13 @@ Spectrum = NDArray[np.complexfloating[Any, Any]]
 _SINGLE, _GROWTH = 30, 0.03
 
 #: Samples by which the dead times are shorter than those of the model.
-_EARLIER = (-6, -4, -2, -1, 0, 1, 2, 3, 5, 8, 12, 20)
+_EARLIER = (-40, -28, -20, -14, -9, -6, -4, -2, -1, 0, 1, 2, 3, 5, 8, 12, 20)
 
 #: Least damping ratio, so that no frequency is a pole.
 _LEAST_DAMPING = 1e-3
+
+#: Transfer functions of each input that are combined.
+_OWN = 2
 
 #: Iterations.
 _ITERATIONS = 5
@@ -35,24 +39,32 @@ class Reduced(NamedTuple):
 
     Attributes
     ----------
-    poles : ndarray
+    poles : ndarray, shape (order,)
         In continuous time and samples, without integrators.
+    drives : ndarray of bool, shape (outputs, inputs, order)
+        Whether a pole is in the response of an output to an input.
     loss : float
         Increase of the deviance that is expected.
-    integrators, zeros : int
-    delays : ndarray of int64, shape (outputs, inputs)
+    integrators, zeros, delays : ndarray of int64, shape (outputs, inputs)
     """
 
     poles: Spectrum
+    drives: NDArray[np.bool_]
     loss: float
-    integrators: int
-    zeros: int
+    integrators: NDArray[np.int64]
+    zeros: NDArray[np.int64]
     delays: NDArray[np.int64]
 
     @property
-    def order(self) -> int:
-        """Number of poles."""
-        return self.poles.size + self.integrators
+    def size(self) -> int:
+        """Number of poles and zeros."""
+        return self.poles.size + int(self.zeros.sum())
+
+    @property
+    def excess(self) -> NDArray[np.int64]:
+        """Poles of every response less its zeros."""
+        orders: NDArray[np.int64] = self.drives.sum(axis=2) + self.integrators
+        return orders - self.zeros
 
 
 class Response(NamedTuple):
@@ -73,6 +85,45 @@ class Response(NamedTuple):
     values: Spectrum
     weights: Signal
     delays: NDArray[np.int64]
+
+    def take_input(self, place: int) -> "Response":
+        """Return the response to one input."""
+        own = np.s_[:, [place]]
+        return Response(self.frequencies, self.values[own], self.weights[own], self.delays[own])
+
+
+def reduce_inputs(
+    response: Response, orders: Sequence[int], integrators: NDArray[np.int64], penalty: float
+) -> Iterator[Reduced]:
+    """Yield transfer functions whose inputs have poles of their own.
+
+    Parameters
+    ----------
+    response : Response
+    orders : sequence of int
+        Without the integrators.
+    integrators : ndarray of int64, shape (inputs,)
+    penalty : float
+        Cost of a parameter. Of every input, the transfer functions of the two least costs are taken.
+    """
+    choices = []
+    for place, count in enumerate(integrators.tolist()):
+        own = reduce_model(response.take_input(place), [order + count for order in orders], count, 1)
+        choices.append(sorted(own, key=lambda each: each.loss + penalty * each.size)[:_OWN])
+    for parts in product(*choices):
+        drives = np.zeros((*response.delays.shape, sum(part.poles.size for part in parts)), bool)
+        end = 0
+        for place, part in enumerate(parts):
+            drives[:, place, end : end + part.poles.size] = True
+            end += part.poles.size
+        yield Reduced(
+            np.concatenate([part.poles for part in parts]),
+            drives,
+            sum(part.loss for part in parts),
+            np.hstack([part.integrators for part in parts]),
+            np.hstack([part.zeros for part in parts]),
+            np.hstack([part.delays for part in parts]),
+        )
 
 
 def reduce_model(
@@ -104,7 +155,10 @@ def reduce_model(
                     continue
                 delays = np.maximum(response.delays - _EARLIER[at], 0)
                 moved = target * np.exp(-s * (response.delays - delays)[:, :, None])
-                found[at] = Reduced(*_iterate(s, moved, weights, poles, zeros), integrators, zeros, delays)
+                moving, loss = _iterate(s, moved, weights, poles, zeros)
+                drives = np.ones((*delays.shape, count), bool)
+                own, all_zeros = np.full_like(delays, integrators), np.full_like(delays, zeros)
+                found[at] = Reduced(moving, drives, loss, own, all_zeros, delays)
                 place = min(found, key=lambda each: found[each].loss)
                 waiting += [
                     each for each in (place - 1, place + 1) if each not in found and each not in waiting

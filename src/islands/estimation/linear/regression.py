@@ -141,6 +141,16 @@ class Structure:
             if pole.imag >= 0.0
         ]
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What equal structures have in common."""
+        orders = np.repeat(self.drives, [part.size for part in self.parts], axis=2).sum(axis=2)
+        excess = np.clip(self.excess, 1, np.maximum(orders, 1))
+        fractions = np.where(self.leads & (excess > 1), self.fractions, 0.5)
+        arrays = (*self.sections, self.delays, self.leads, *self.noise, self.drives, excess, fractions)
+        before = None if self.before is None else self.before.tobytes()
+        return self.integrators, self.rests, before, *(each.tobytes() for each in arrays)
+
     def take(self, modes: Sequence[Mode], **changes: Any) -> "Structure":
         """Return the structure with other modes; real poles share a section with those of the same inputs."""
         sections, drives = [], []

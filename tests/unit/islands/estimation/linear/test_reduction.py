@@ -27,7 +27,7 @@ def record():
 
 
 def take_true(found):
-    return next(each for each in found if each.order == 3 and each.zeros == 0)
+    return next(each for each in found if each.poles.size == 3 and not each.zeros.any())
 
 
 def test_a_model_of_more_parameters_leads_to_the_poles_the_dead_time_and_its_deviance(record):
