@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from support.coupled_systems import TWO_MASSES, make_coupled_record
 from support.played import run_submitted
 from support.processes import eventually
 from support.reading import APPEARANCES, unreadable
@@ -166,4 +167,52 @@ def test_the_linear_system_of_a_model_is_shown_about_any_operating_point(
     picture = page.get_by_role("img", name="Nyquist plot, drawn by the service")
     page.locator(".linear .rendered").nth(1).scroll_into_view_if_needed()
     expect(picture).to_be_visible(timeout=DRAWN)
+    assert unreadable(page) == []
+
+
+@pytest.fixture(scope="module")
+def finished_outputs(service: ServiceClient, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """A succeeded job of two outputs, and its file."""
+    record = make_coupled_record(TWO_MASSES, samples=200, noise=0.01)
+    path = tmp_path_factory.mktemp("outputs") / "masses.csv"
+    columns = np.column_stack([0.1 * np.arange(200).round(3), record.records[0].u, record.y])
+    np.savetxt(path, columns, delimiter=",", header="t_s,u,y1,y2", comments="")
+    data = service.ask("POST", "/v1/datasets", files={"file": (path.name, path.read_bytes())}).json()
+    settings = {"population": 8, "max_terms": 4, "library_degree": 1, "average": 1, "islands": 1}
+    spec = {"preset": "narx", "inputs": ["u"], "output": ["y1", "y2"], "dataset": data["id"]}
+    spec["settings"] = {**settings, "generations": 2}
+    answer = service.ask("POST", "/v1/jobs", json=spec)
+    return run_submitted(service, answer.json()["id"]), path
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize(("scheme", "width"), [("dark", 1440), ("light", 390)])
+def test_a_result_of_several_outputs_has_what_one_of_one_output_has_for_each(
+    opened: Callable[..., Any],
+    service: ServiceClient,
+    finished_outputs: tuple[str, Path],
+    expect: Any,
+    scheme: str,
+    width: int,
+) -> None:
+    job, path = finished_outputs
+    page = opened(f"#/jobs/{job}", width=width, color_scheme=scheme)
+    outputs = service.ask("GET", f"/v1/jobs/{job}/result").json()["outputs"]
+    rows = page.get_by_role("table", name="Outputs, simulated together").locator("tbody tr")
+    expect(rows).to_have_count(2)
+    for output, row in zip(outputs, rows.all(), strict=True):
+        free = [output["metrics"][part]["free_run"] for part in ("estimation", "validation")]
+        shown = row.locator("data").evaluate_all("all => all.map((one) => Number(one.value))")
+        assert shown == [number for part in free for number in (part["mape"], part["r2"])]
+    for name in ("y1", "y2"):
+        expect(page.locator(".sentences")).to_contain_text(f"{name}, error: RMSE")
+    expect(page.locator("article math")).to_have_count(2)
+    expect(page.get_by_role("button", name="MATLAB System")).to_be_visible()
+    page.get_by_text("Linear system: Bode").click()
+    expect(page.locator(".linear .modes li").first).to_contain_text("resonance at 0.6")
+    form = page.locator(".scenarios")
+    form.locator("input[type=file]").set_input_files(str(path))
+    form.get_by_role("button", name="Simulate").click()
+    expect(form.locator("figure.chart")).to_have_count(2, timeout=60_000)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert unreadable(page) == []

@@ -582,8 +582,13 @@ class StateSpace:
         return ", ".join(f"{name} = {value:.4g}" for name, value in pairs) or "its operating point"
 
     def describe(self) -> tuple[str, ...]:
-        """State time constants and resonances, dead times and static gains."""
-        modes = () if self.dt is None else describe_poles(self.poles, self.dt)
+        """State time constants and resonances, dead times and static gains.
+
+        Several outputs may have the same modes, each with states of its own: they are stated once.
+        """
+        modes: Iterable[str] = () if self.dt is None else describe_poles(self.poles, self.dt)
+        if len(self.output_names) > 1:
+            modes = dict.fromkeys(modes)
         late = [
             f"dead time of {name} {delay:.4g} s"
             for name, delay in zip(self.input_names, self.dead_times, strict=False)

@@ -240,12 +240,14 @@ const listParameters = (path, model, names, signal) =>
 
 function makeDetail(job, model, { hysteresis, names }, signal) {
   const path = `${getJobPath(job.id)}/models/${model.rank}`;
+  const [equation, ...parameters] = names
+    ? listParameters(path, model, names, signal)
+    : [makeEquation(path, model, signal), ...listChecks(model, hysteresis)];
   return [
     el("h3", { id: "model" }, `Model ${model.rank}`),
-    ...(names
-      ? listParameters(path, model, names, signal)
-      : [makeEquation(path, model, signal), ...listChecks(model, hysteresis)]),
+    equation,
     makeExportRow(path, model.rank),
+    ...parameters,
     makeGallery(path, signal),
     makeLinearSystem(path, job.spec, signal),
     ...(names ? [makeScenarioUpload(path, job.spec.output, signal)] : []),
