@@ -175,4 +175,4 @@ def test_a_state_space_that_outputs_share_is_a_model_as_any_other(service, tmp_p
         assert "y2" in client.export(job, 1, "c")
         succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "arm")
         assert islands.load(tmp_path / "arm").best.model == saved.model
-        assert outcome.summary["size"] == saved.model.size
+        assert outcome.summary["size"] < saved.model.size  # without the coordinates of the states
