@@ -71,7 +71,8 @@ def test_a_job_has_the_model_of_the_library(service, dataset, record, tmp_path):
         assert "y1(k) =" in succeed("jobs", "show", job.id, "--watch", "--url", service.url)
         names = name_free_run_artefacts(1, 2)
         stored = [service.store.results.artefact(job.id, name) for name in names]
-        assert client.report(job).count(b"<img") == 2
+        # The free run of each output, frequency response, step responses and poles.
+        assert client.report(job).count(b"<img") == 5
         # The report draws the free runs that were stored with the result.
         assert stored == [service.store.results.artefact(job.id, name) for name in names]
         path = f"{service.url}/v1/jobs/{job.id}/models/1/simulation"
@@ -174,4 +175,4 @@ def test_a_state_space_that_outputs_share_is_a_model_as_any_other(service, tmp_p
         assert "y2" in client.export(job, 1, "c")
         succeed("jobs", "show", job.id, "--url", service.url, "--out", tmp_path / "arm")
         assert islands.load(tmp_path / "arm").best.model == saved.model
-        assert outcome.summary["size"] == saved.model.size
+        assert outcome.summary["size"] < saved.model.size  # without the coordinates of the states

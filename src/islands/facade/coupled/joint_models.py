@@ -7,13 +7,13 @@ The candidates are compared on the common free run, as linear and nonlinear mode
 * one equation, or one latent model, for each output.
 
 The separate searches are not made if they cannot win: if the state space has more parameters than their
-equations may have terms, and a trial of an equation on measured outputs has more than twice its error.
+equations may have terms, and a trial of the equations on measured outputs has decisively less evidence.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import isfinite, sqrt
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -45,17 +45,15 @@ from islands.records.coupled import CoupledSplit
 from islands.records.input_lead import advance_all_inputs
 from islands.records.split import Split
 from islands.report.documents.result_folder import record_document
+from islands.rounding import RESOLUTION
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, EnsembleStructure, ValidatedModel, make_ensemble
-from islands.validation.evidence import measure_size
+from islands.validation.evidence import measure_lack, measure_size
 from islands.validation.prediction_bands import OutputBands, calibrate_output_bands
-from islands.validation.recommendation import recommend_joint
+from islands.validation.recommendation import DECISIVE, recommend_joint
 
 #: The linear model is estimated by the error of the free run.
 _CRITERION = refinement_criterion(None)
-
-#: Error of a trial of equations, relative to that of a joint model, from which they are not searched.
-_LARGEST_RATIO = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,8 +192,9 @@ def exceeds_equations(
 ) -> bool:
     """Return whether one equation for each output cannot win against the best model of all of them.
 
-    It has more parameters than the equations may have terms, and a trial of the equations on measured values
-    of the other outputs has more than twice the error: nonlinear terms do not replace states.
+    It has more parameters than the equations may have terms, and equations with the errors of a trial on
+    measured values of the other outputs would have decisively less evidence, even with one term each:
+    nonlinear terms do not replace states.
 
     Parameters
     ----------
@@ -210,14 +209,20 @@ def exceeds_equations(
     best = choose_candidate(found, 1)[0] if found else None
     if best is None or best.assessed.size <= terms:
         return False
-    limit, total = _LARGEST_RATIO * best.assessed.validation_error, 0.0
+    errors = []
     for place, each in enumerate(data.estimation.records):
         steps.report(f"trial of an equation of {each.output_name}", None)
         error = min(measure_library(hold_out(data.estimation.separate(place)), trial, steps))
-        total += (error / (each.output_range or 1.0)) ** 2 / len(data.estimation.records)
-        if sqrt(total) > limit:
-            return True
-    return False
+        errors.append(max(error / (each.output_range or 1.0), RESOLUTION))
+    entry = best.assessed
+    known, tried = measure_lack(
+        (entry.model, entry.model),
+        (entry.size, len(errors)),
+        (entry.mean_square, np.exp(np.mean(np.log(np.square(errors))))),
+        entry.effective_samples,
+        1,
+    )
+    return bool(tried > known + DECISIVE)
 
 
 def choose_candidate(candidates: Sequence[JointCandidate], terms: int) -> tuple[JointCandidate, str]:

@@ -12,6 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from islands.errors import lookup
 from islands.models.state_space import StateSpace, find_resonances
+from islands.records.envelope import find_envelope
+from islands.report.figures.lines import VERTICES, downsample
 from islands.report.figures.style import (
     FRAME,
     REMARK,
@@ -29,6 +31,9 @@ _STYLES = ("-", "--", "-.", ":")
 
 #: Distance from the ends of the axis, as a fraction, below which a mark is written inwards.
 _NEAR = 0.2
+
+#: Height of the text of a resonance in inches.
+_ROW = 10.0 / 72.0
 
 #: Opacity of bands and members.
 _SHADE = 0.25
@@ -61,43 +66,46 @@ def draw_bode(system: StateSpace) -> Figure:
     Returns
     -------
     Figure
-        Two axes. A line for each input and output; none of an input without an effect.
+        Two axes for each output. A line for each input; none of an input without an effect.
     """
     response = system.frequency_response()
-    frequencies = response.points
-    figure = blank(4.2, _write_title(system, has_bands=True))
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1))
-    set_log_scale(above)
-    above.set_xscale("log")
-    write_plain_numbers(below.xaxis)
+    frequencies, hertz = response.points, _name_frequencies(system)
+    marks = _list_marks(find_resonances(system.poles, system.step), hertz)
+    outputs = len(system.D)
+    figure = blank(0.4 + 3.6 * outputs + _ROW * len(marks), _write_title(system, has_bands=True))
+    panels = figure.subplots(2 * outputs, 1, sharex=True, height_ratios=(1.3, 1) * outputs, squeeze=False)
     banded = len(response.members) > 1
     if banded:
         # The phases of the members differ from that of the system by less than a turn.
         relative = response.members / np.where(response.values == 0.0, 1.0, response.values)
         magnitudes = response.band()
         shifts = [np.degrees(each) for each in replace(response, members=relative).band(of=np.angle)]
-    for place, (name, output, channel) in enumerate(_list_channels(system)):
-        values, style = response.values[output, channel], _choose_style(place)
-        if not values.any():
-            above.plot([], [], color=FRAME, label=f"{name}: no effect")
-            continue
-        phase = np.degrees(np.unwrap(np.angle(values)))
-        above.plot(frequencies, np.abs(values), label=name, **style)
-        below.plot(frequencies, phase, label=name, **style)
-        if banded:
-            limits = [each[output, channel] for each in magnitudes]
-            above.fill_between(frequencies, *limits, color=style["color"], alpha=_SHADE, lw=0)
-            turned = [phase + each[output, channel] for each in shifts]
-            below.fill_between(frequencies, *turned, color=style["color"], alpha=_SHADE, lw=0)
-    below.set_xlim(frequencies[0], frequencies[-1])
-    hertz = _name_frequencies(system)
-    _mark_resonances(above, below, find_resonances(system.poles, system.step), hertz)
-    units = {(output, unit) for output in system.output_units for unit in system.input_units}
-    above.set_ylabel(f"magnitude ({'/'.join(units.pop())})" if _have_one_quotient(units) else "magnitude")
-    above.legend(loc="best")
-    below.set_ylabel("phase (degrees)")
-    below.yaxis.set_major_locator(MaxNLocator(steps=[1, 1.5, 3, 4.5, 9, 10], nbins=6))
-    below.set_xlabel(f"frequency ({hertz})")
+    for output, (above, below) in enumerate(panels.reshape(outputs, 2)):
+        set_log_scale(above)
+        above.set_xscale("log")
+        for place, (name, _, channel) in enumerate(_list_channels(system, output)):
+            values, style = response.values[output, channel], _choose_style(place)
+            if not values.any():
+                above.plot([], [], color=FRAME, label=f"{name}: no effect")
+                continue
+            phase = np.degrees(np.unwrap(np.angle(values)))
+            above.plot(frequencies, np.abs(values), label=name, **style)
+            below.plot(frequencies, phase, label=name, **style)
+            if banded:
+                limits = [each[output, channel] for each in magnitudes]
+                above.fill_between(frequencies, *limits, color=style["color"], alpha=_SHADE, lw=0)
+                turned = [phase + each[output, channel] for each in shifts]
+                below.fill_between(frequencies, *turned, color=style["color"], alpha=_SHADE, lw=0)
+        units = {(unit, other) for unit in system.output_units[output:][:1] for other in system.input_units}
+        above.set_ylabel(f"magnitude ({'/'.join(units.pop())})" if _have_one_quotient(units) else "magnitude")
+        above.legend(loc="best")
+        below.set_ylabel("phase (degrees)")
+        below.yaxis.set_major_locator(MaxNLocator(steps=[1, 1.5, 3, 4.5, 9, 10], nbins=6))
+    lowest = panels[-1, 0]
+    write_plain_numbers(lowest.xaxis)
+    lowest.set_xlim(frequencies[0], frequencies[-1])
+    lowest.set_xlabel(f"frequency ({hertz})")
+    _draw_marks(panels[:, 0].tolist(), marks)
     figure.align_ylabels()
     return finish(figure)
 
@@ -170,20 +178,29 @@ def draw_pole_map(system: StateSpace) -> Figure:
 def draw_unit_step(system: StateSpace) -> Figure:
     """Draw the responses to a unit step of every input, with 90 % bands if they are known."""
     response = system.step_response()
-    figure = blank(3.4, _write_title(system, has_bands=True))
-    axes = figure.subplots()
-    for place, (name, output, channel) in enumerate(_list_channels(system)):
-        style = _choose_style(place)
-        axes.step(response.points, response.values[output, channel], where="post", label=name, **style)
-        if len(response.members) > 1:
-            low, high = (each[output, channel] for each in response.band(of=np.real))
-            axes.fill_between(
-                response.points, low, high, step="post", color=style["color"], alpha=_SHADE, lw=0
-            )
-    axes.set_xlim(response.points[0], response.points[-1])
-    axes.set_xlabel("samples after the step" if system.dt is None else "time after the step (s)")
-    axes.set_ylabel("response to a unit step")
-    axes.legend(loc="best")
+    outputs = len(system.D)
+    figure = blank(0.4 + 3.0 * outputs, _write_title(system, has_bands=True))
+    panels = figure.subplots(outputs, sharex=True, squeeze=False)[:, 0]
+    for output, axes in enumerate(panels):
+        for place, (name, _, channel) in enumerate(_list_channels(system, output)):
+            style = _choose_style(place)
+            line = downsample(response.points, response.values[output, channel])
+            axes.step(*line, where="post", label=name, **style)
+            if len(response.members) > 1:
+                low, high = (each[output, channel] for each in response.band(of=np.real))
+                least, _, first = find_envelope(low, VERTICES // 4)
+                _, greatest, _ = find_envelope(high, VERTICES // 4)
+                axes.fill_between(
+                    *(response.points[first], least, greatest),
+                    step="post",
+                    color=style["color"],
+                    alpha=_SHADE,
+                    lw=0,
+                )
+        axes.set_ylabel("response to a unit step")
+        axes.legend(loc="best")
+    panels[-1].set_xlim(response.points[0], response.points[-1])
+    panels[-1].set_xlabel("samples after the step" if system.dt is None else "time after the step (s)")
     return finish(figure)
 
 
@@ -198,8 +215,8 @@ def _write_title(system: StateSpace, has_bands: bool = False) -> str:
     return f"linear part about {system.describe_point()}{bands}"
 
 
-def _list_channels(system: StateSpace) -> list[tuple[str, int, int]]:
-    """Return the label, the output and the input of every transfer function."""
+def _list_channels(system: StateSpace, only: int | None = None) -> list[tuple[str, int, int]]:
+    """Return the label, the output and the input of every transfer function, or of those of one output."""
     outputs, inputs = system.D.shape
     return [
         (
@@ -212,7 +229,7 @@ def _list_channels(system: StateSpace) -> list[tuple[str, int, int]]:
             output,
             channel,
         )
-        for output in range(outputs)
+        for output in (range(outputs) if only is None else [only])
         for channel in range(inputs)
     ]
 
@@ -233,24 +250,25 @@ def _have_one_quotient(units: set[tuple[str, str]]) -> bool:
     return len(units) == 1 and all(map(all, units))
 
 
-def _mark_resonances(above: Axes, below: Axes, resonances: Sequence[tuple[float, float]], hertz: str) -> None:
-    """Mark the frequencies of resonances in both axes, with their damping ratios above.
-
-    Outputs with the same poles have the same resonances, which are marked once.
-    """
-    first, last = np.log(above.get_xlim())
-    marks = {
+def _list_marks(resonances: Sequence[tuple[float, float]], hertz: str) -> dict[str, float]:
+    """Return the frequencies of resonances by what is written; those that outputs have in common once."""
+    return {
         f"{frequency:.4g} {hertz}, damping ratio {damping:.3g}": frequency
         for frequency, damping in resonances
     }
+
+
+def _draw_marks(panels: Sequence[Axes], marks: Mapping[str, float]) -> None:
+    """Mark the frequencies of resonances in all panels, with their damping ratios above the first one."""
+    first, last = np.log(panels[0].get_xlim())
     for row, (text, frequency) in enumerate(marks.items()):
         place = float((np.log(frequency) - first) / (last - first))
-        for axes in (above, below):
+        for axes in panels:
             axes.axvline(frequency, color=FRAME, lw=0.8, ls=":")
-        above.annotate(
+        panels[0].annotate(
             text,
             (frequency, 1.0),
-            xytext=(0, 4 + 10 * row),
+            xytext=(0, 4 + 72 * _ROW * row),
             xycoords=("data", "axes fraction"),
             textcoords="offset points",
             ha="left" if place < _NEAR else "right" if place > 1.0 - _NEAR else "center",

@@ -63,7 +63,7 @@ def test_a_run_that_its_wall_time_has_ended_is_resumed_to_the_whole_result(recor
     settings = ("--preset", "paper-appendix", "--set", "population=20", "--generations", 1, "--max-terms", 3)
     whole, part = tmp_path / "whole", tmp_path / "part"
     with undrawn_figures():
-        assert "2 outputs" in succeed("identify", record, *COLUMNS, *settings, "--out", whole)
+        assert "y2, error: RMSE" in succeed("identify", record, *COLUMNS, *settings, "--out", whole)
         succeed("identify", record, *COLUMNS, *settings, "--wall-time", 1e-9, "--out", part)
         searches = [
             json.loads((part / "outputs" / name / "result.json").read_text())["search"]

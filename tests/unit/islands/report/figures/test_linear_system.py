@@ -36,6 +36,21 @@ def test_a_resonance_is_marked_with_its_damping_ratio():
     assert frequencies[magnitude.argmax()] == pytest.approx(5.189, rel=0.1)
 
 
+def test_each_output_has_its_panels_and_a_common_resonance_is_marked_once():
+    one = make_model().linearise()
+    A, C = (np.kron(np.eye(2), each) for each in (one.A, one.C))
+    B, D = (np.tile(each, (2, 1)) for each in (one.B, one.D))
+    names = {"output_names": ("a", "b"), "output_units": ("m", "N"), "operating_outputs": (0.0, 0.0)}
+    both = replace(one, A=A, B=B, C=C, D=D, **names)
+    first, _, second, _ = draw_bode(both).axes
+    assert [len(axes.texts) for axes in (first, second)] == [1, 0]
+    assert "(N/" in second.get_ylabel()
+    assert first.lines[0].get_ydata() == pytest.approx(second.lines[0].get_ydata())
+    assert len(draw_linear_system(both, "unit-step").axes) == 2
+    mode, gain = one.describe()
+    assert both.describe() == (mode, f"{gain} on a", f"{gain} on b")
+
+
 @pytest.mark.parametrize("kind", LINEAR_FIGURES)
 def test_bands_are_drawn_of_a_system_whose_uncertainty_is_known(kind):
     system = make_model().linearise()
