@@ -1,4 +1,4 @@
-"""Linear systems with one curve, the simplest nonlinear models of a record.
+"""Linear systems with one curve, the simplest nonlinear models of a record with dynamics.
 
 A curve is a unit that reads one signal: an input, or the output of the linear system. Every function of
 `FUNCTIONS` is tried at a few offsets, from each of a few linear systems. Its effects begin at zero, and are
@@ -134,7 +134,8 @@ def _list_drafts(system: FittedStateSpace, data: LatentData) -> Iterator[Draft]:
     read[1:, order:] = np.eye(system.inputs)
     # Laws in absolute units, as the root of a level, bend at the zero of the unit.
     zeros = [blocks["level"][0] + scales.level / scales.height, *(scales.mean / scales.deviation)]
-    for weights, zero in zip(read, zeros, strict=True):
+    # A static system has no output of its states.
+    for weights, zero in list(zip(read, zeros, strict=True))[not order :]:
         for function, offset in product(FUNCTIONS, (*_OFFSETS, float(zero))):
             for sign in (1.0,) if parse_unit(function).parity else (1.0, -1.0):
                 yield _append_curve(system.draft(), function, sign * weights, sign * offset)

@@ -372,7 +372,7 @@ def measure_held_out(fit: StateSpaceFit, data: LatentData) -> float:
     order, rows = fit.states.shape[1], data.held_out
     starts = [estimate_start(fit.theta, fit.codes, each, order) for each in rows.late]
     normal = np.random.default_rng(_SEED).standard_normal((len(starts), _DISTURBED, order))
-    disturbed = _DISTURBANCE * scales * normal.transpose(1, 0, 2).reshape(-1, order)
+    disturbed = _DISTURBANCE * scales * normal.transpose(1, 0, 2).reshape(_DISTURBED * len(starts), order)
     errors = []
     for lanes, states in (
         (rows.disturbed, disturbed),

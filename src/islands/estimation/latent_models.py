@@ -303,7 +303,7 @@ def _write_in_modes(
     start : ndarray, shape (states,)
         States at the first row.
     """
-    found = find_modal_form(layout.split(theta)["A"])
+    found = find_modal_form(layout.split(theta)["A"]) if layout.order else None
     if found is None:
         return theta
     blocks, forward = found
@@ -349,7 +349,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
     theta = _write_in_modes(
         layout, np.array(system.theta), system.units, data.used[0].u, np.array(system.states[0])
     )
-    radius = float(np.abs(np.linalg.eigvals(layout.split(theta)["A"])).max())
+    radius = float(np.abs(np.linalg.eigvals(layout.split(theta)["A"])).max(initial=0.0))
     # Changes of units and coordinates round: the corrections restore the last digits.
     theta = data.stated.polish(
         StateSpaceParameters(layout, data.scales.use_record_units(layout, theta), find_codes(system.units))

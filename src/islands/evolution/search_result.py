@@ -30,7 +30,7 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.evidence import is_linear, measure_size
+from islands.validation.evidence import is_linear, is_static, measure_size
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, is_sound, recommend, recommend_fittest
 from islands.validation.simple_models import assess_curve_models, assess_linear_model
@@ -429,9 +429,10 @@ def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     Of one size, the least error of the free run on all data is the most evidence. If the best model fails the
     physics checks, the best one of those that pass them is kept as well, as in a recommendation.
     """
-    groups: dict[tuple[str, bool, int], list[Assessment]] = {}
+    groups: dict[tuple[str, bool, bool, int], list[Assessment]] = {}
     for entry in sorted(rank_models(models), key=lambda each: each.mean_square):
-        kind = entry.model.kind, is_linear(entry.model) and isinstance(entry.model, LatentModel)
+        model = entry.model
+        kind = model.kind, is_linear(model) and isinstance(model, LatentModel), is_static(model)
         groups.setdefault((*kind, entry.model.free_size), []).append(entry)
     kept = []
     for group in groups.values():

@@ -17,6 +17,7 @@ from islands.expressions.tree import Constant, Lagged
 from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
+from islands.records.channel_names import parse_channel_name
 
 _ONE = Constant(1.0)
 
@@ -32,8 +33,26 @@ def is_linear(model: AnyModel) -> bool:
     )
 
 
+def is_static(model: AnyModel) -> bool:
+    """Return whether the output of a model depends on the inputs of the same sample only, and on one."""
+    if isinstance(model, CoupledModel):
+        return all(map(is_static, model.models))
+    if isinstance(model, LatentModel):
+        return not model.order and not any(model.delays) and reads_inputs(model)
+    if not isinstance(model, Model):
+        return False
+    now = {(place, 1) for place, name in enumerate(model.input_names, 1) if parse_channel_name(name).at_once}
+    lags = {each for item in model.regressors for each in item.lags}
+    return bool(lags) and lags <= now
+
+
 def name_form(model: AnyModel) -> str:
-    """Return the form of a model: ``linear``, ``curve`` (linear with one), ``equation``, ``state space``."""
+    """Return the form of a model.
+
+    It is ``static``, ``linear``, ``curve`` (linear with one), ``equation`` or ``state space``.
+    """
+    if is_static(model):
+        return "static"
     if is_linear(model):
         return "linear"
     if isinstance(model, LatentModel):

@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.evidence import count_terms, is_linear, measure_lack
+from islands.validation.evidence import count_terms, is_linear, is_static, measure_lack
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
 #: Difference of the evidence of two models that do not count as equal.
@@ -130,7 +130,11 @@ def recommend(
     selection.keep(CHECKS, [at for at in selection.left if is_sound(assessments[at].physics, hysteresis)])
     chosen = _take_simplest(selection.left, sizes, assessments, lack)
     found = Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
+    model = assessments[chosen].model
     reasons = (
+        f"static: {model.output_name} depends on the inputs of the same sample only"
+        if is_static(model)
+        else "",
         _describe_choice(found, sizes, assessments, unit),
         _describe_physics(found, assessments, hysteresis, unit),
     )
@@ -164,8 +168,13 @@ def _take_simplest(
     assessments: Sequence[Comparable],
     lack: Mapping[int, float],
 ) -> int:
-    """Return the linear one of models with as much evidence, or the smallest."""
-    return min(places, key=lambda at: (not is_linear(assessments[at].model), sizes[at], lack[at], at))
+    """Return the linear one of models with as much evidence, or a static one, or the smallest."""
+
+    def rank(at: int) -> tuple[bool, bool, float, float, int]:
+        model = assessments[at].model
+        return not is_linear(model), not is_static(model), sizes[at], lack[at], at
+
+    return min(places, key=rank)
 
 
 def _measure_lack(

@@ -5,9 +5,15 @@ from islands.estimation.curve_models import identify_curve_models
 from islands.estimation.estimator_table import BOX_JENKINS, refinement_criterion
 from islands.estimation.linear.latent import identify_linear_model
 from islands.estimation.parameter_constraints import constraint
+from islands.estimation.static_models import identify_static_models
 from islands.progress import Steps
+from islands.records.channel_names import parse_channel_name
 from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
+from islands.validation.evidence import is_linear
+
+#: Error that the parameters of a static model minimise: it has no memory, so that all are one.
+_STATIC = refinement_criterion(None)
 
 
 def assess_linear_model(
@@ -44,10 +50,36 @@ def assess_linear_model(
     return found if all(check.met for check in found.constraints) else None
 
 
+def assess_static_models(split: Split, shooting: int, warm_up: int, steps: Steps) -> list[Assessment]:
+    """Identify the static models of the estimation data, with the linear one, and assess them.
+
+    Parameters
+    ----------
+    split : Split
+        All inputs are read one sample early.
+    shooting, warm_up, steps
+        As for `assess_linear_model`.
+
+    Returns
+    -------
+    list of Assessment
+        None if the data are too short.
+    """
+    try:
+        return [
+            assess(model, split, shooting, warm_up, "none", _STATIC)
+            for model in identify_static_models(split.estimation, steps)
+        ]
+    except RecordError:
+        return []
+
+
 def assess_curve_models(
     split: Split, shooting: int, warm_up: int, constraints: str, steps: Steps
 ) -> list[Assessment]:
-    """Identify linear models with one curve of the estimation data and assess them.
+    """Identify static models and linear models with one curve of the estimation data, and assess them.
+
+    There are static models if all inputs are read one sample early.
 
     Parameters
     ----------
@@ -62,7 +94,11 @@ def assess_curve_models(
     if constraint(constraints).sums:
         return []
     try:
-        models = identify_curve_models(split.estimation, steps)
+        record = split.estimation
+        is_early = all(parse_channel_name(name).at_once for name in record.input_names)
+        static = identify_static_models(record, steps) if is_early else []
+        # The linear rung has gains alone.
+        models = [*(each for each in static if not is_linear(each)), *identify_curve_models(record, steps)]
         first = max([warm_up, *(model.maximum_lag for model in models)])
         found = [
             assess(model, split, shooting, first, constraints, refinement_criterion(None)) for model in models

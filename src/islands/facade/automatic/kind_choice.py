@@ -10,21 +10,25 @@ from types import MappingProxyType
 
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.search_result import SearchResult
+from islands.evolution.search_result import SearchResult, rank_models
 from islands.facade.automatic.choice import Choice
 from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
 from islands.facade.fit_settings import FitSettings
 from islands.facade.front import Front, StoppedFitError, find_linear_result, list_simple
 from islands.facade.library_fit import LibraryFit, fit_library
+from islands.facade.trials.feedthrough_selection import advance_split
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData, prepare_data
+from islands.facade.trials.static_selection import find_static
 from islands.progress import Steps, StoppedError
+from islands.records.averaging import AUTO as AUTO_AVERAGE
 from islands.records.dataset import Dataset
+from islands.records.input_lead import AUTO as AUTO_FEEDTHROUGH
 from islands.records.inspection.rest import check_rest
 from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import measure_size
+from islands.validation.evidence import is_static, measure_size
 from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
@@ -114,13 +118,15 @@ def _choose_kind(
     late = {kind: library.with_delays(trials.delays) for kind, library in libraries.items()}
     least += max(trials.delays, default=0)
     first = late[min(promising, key=trials.errors.__getitem__)]
-    data = prepare_data(split, settings.average, settings.feedthrough, first, least, steps)
+    data = _find_static_data(split, settings, first, steps)
+    data = data or prepare_data(split, settings.average, settings.feedthrough, first, least, steps)
     smooth = [each for each in late.values() if not constraint(each.constraints).sums]
     simple = list_simple(data, smooth[0], settings, steps) if smooth else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
     fits.add({kind: late[kind] for kind in promising})
     errors = fits.measure_errors()
-    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors)
+    static = [each for each in simple if is_static(each.model)]
+    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, static)
     chosen, used, sentence = kind, trials.delays, _describe_delays(trials, settings, steps)
     if used and settings.delays is None:
         without = f"{kind} without dead time"
@@ -136,6 +142,17 @@ def _choose_kind(
         MappingProxyType(data.to_document()),
     )
     return choice, fits.make_front(chosen)
+
+
+def _find_static_data(
+    split: Split, settings: FitSettings, library: TrialLibrary, steps: Steps
+) -> PreparedData | None:
+    """Return the data of a static record, at its rate; None of another one, or if the settings say how."""
+    chosen = settings.average, settings.feedthrough, settings.delays
+    if chosen != (AUTO_AVERAGE, AUTO_FEEDTHROUGH, None):
+        return None
+    places = find_static(split, library, steps)
+    return PreparedData(advance_split(split, places), 1, places) if places else None
 
 
 def _describe_delays(trials: KindTrials, settings: FitSettings, steps: Steps) -> str:
@@ -262,8 +279,9 @@ def _select_kind(
     trials: KindTrials,
     compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
+    static: Sequence[Assessment],
 ) -> tuple[str, str]:
-    """Return the kind and the reason."""
+    """Return the kind and the reason; a static model keeps the property of hysteresis as well."""
     if not record.output_range > 0.0:
         return trials.promising[0], "because the output is constant"
     if len(compared) < 2:
@@ -278,7 +296,7 @@ def _select_kind(
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
     least = min(errors.values())
     close = [each for each in constrained if errors[each] <= _CLOSE * least]
-    if close and check_rest(record).value:
+    if close and check_rest(record).value and not _is_static([compared[close[0]], *static]):
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
             f"model on the validation data is {percent(errors[close[0]])} of the output "
@@ -286,6 +304,13 @@ def _select_kind(
         )
     kind, reason = recommend_kind(compared, errors)
     return kind, f"because {reason}"
+
+
+def _is_static(models: Sequence[Assessment]) -> bool:
+    """Return whether the recommended one of some models is static."""
+    ranked = rank_models(models)
+    found = recommend([measure_size(each.model) for each in ranked], ranked, False)
+    return is_static(ranked[found.rank - 1].model)
 
 
 def recommend_kind(compared: Mapping[str, Assessment], errors: Mapping[str, float]) -> tuple[str, str]:

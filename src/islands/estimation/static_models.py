@@ -1,0 +1,93 @@
+"""Static models: the output depends on the inputs of the same sample only.
+
+They are latent models of order 0, whose output is a weighted sum of inputs and one or two curves of them, and
+equations of the terms of a library that read no output. Curves have a scale of their own, equations products.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from islands.estimation.curve_models import add_curves
+from islands.estimation.estimate import estimate
+from islands.estimation.fitted_state_space import Draft, FittedStateSpace
+from islands.estimation.forward_selection import make_selection_problem, select_forward
+from islands.estimation.latent_data import LatentData, make_latent_data
+from islands.estimation.latent_models import estimate_models, find_front
+from islands.estimation.structure_selection.certificate import SubsetSearch
+from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.models.candidate_library import get_library
+from islands.models.latent import LatentModel, StateSpaceLayout
+from islands.models.narx import Model
+from islands.progress import Steps
+from islands.records.dataset import Dataset
+from islands.simulation.outcome import EvaluationOutcome
+
+#: Curves, and terms of an equation, at most.
+_CURVES, _TERMS = 2, 10
+
+#: Steps of the estimation of gains.
+_STEPS = 10
+
+#: Library of the terms.
+_LIBRARY = "magnitude"
+
+
+# The fits of all libraries of a record share its static models.
+@lru_cache(maxsize=4)
+def _share_models(_record: Dataset) -> list[LatentModel | Model]:
+    """Return the list of the models of a record, empty before they are identified."""
+    return []
+
+
+def identify_static_models(record: Dataset, steps: Steps) -> list[LatentModel | Model]:
+    """Identify static models of increasing size.
+
+    Parameters
+    ----------
+    record : Dataset
+        Record without missing values, all inputs of which are read one sample early.
+    steps : Steps
+        Receives what is estimated, and may stop.
+
+    Returns
+    -------
+    list of LatentModel or Model
+        Gains alone, then models with curves, each with a smaller held-out error than all smaller ones, then
+        the equation of every number of terms with the least error.
+
+    Raises
+    ------
+    RecordError
+        The record is too short.
+    StoppedError
+        A stop is requested.
+    """
+    shared = _share_models(record)
+    if not shared:
+        data = make_latent_data(record)
+        found = [_begin(data).estimate(data)]
+        systems = [each for each in found if isinstance(each, FittedStateSpace)]
+        for _ in range(_CURVES):
+            systems += add_curves(find_front(systems)[-1:], data, steps=steps)
+        shared += [*estimate_models(find_front(systems), record, steps), *_fit_equations(record)]
+    return shared
+
+
+def _begin(data: LatentData) -> Draft:
+    """Return a draft of a gain of every input, which begins at zero."""
+    layout = StateSpaceLayout(0, data.record.inputs, 0)
+    size = len(layout.names)
+    return Draft(layout, (), np.zeros(size), np.ones(size, bool), np.zeros((len(data.used), 0)), _STEPS)
+
+
+def _fit_equations(record: Dataset) -> list[Model]:
+    """Return the equations of the terms that read inputs at lag 1 only."""
+    library = screen_candidates(_LIBRARY, get_library(_LIBRARY).degree, 1, record)
+    pool = [item for item in library if all(channel for channel, _ in item.lags)]
+    problem = make_selection_problem(pool, record)
+    if isinstance(problem, EvaluationOutcome):
+        return []
+    structures = SubsetSearch(problem, _TERMS).structures or select_forward(problem, _TERMS)
+    found = [estimate(structure, record) for structure in structures]
+    return [each.model for each in found if not isinstance(each, EvaluationOutcome)]
