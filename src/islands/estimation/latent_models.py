@@ -359,7 +359,7 @@ def make_latent_model(system: FittedStateSpace, data: LatentData) -> LatentModel
     shortest = min(record.segments) * _LARGEST_PART
     # The first sample of a segment lacks its input, and those before a dead time.
     memory = 1 + max(system.delays, default=0)
-    memory += round(max(_SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
+    memory += round(max(1, _SAMPLES_PER_STATE * layout.order, min(LARGEST_MEMORY - 1, decay, shortest)))
     return LatentModel(
         order=layout.order,
         units=system.units,
