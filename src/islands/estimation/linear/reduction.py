@@ -255,6 +255,8 @@ def _iterate(
         real, pairs = moved[np.abs(moved.imag) < 1e-9].real, moved[moved.imag >= 1e-9]
         pairs = np.column_stack([pairs, pairs.conj()]).ravel()
         moved = np.concatenate([real, pairs])
+        if moved.size != poles.size:  # Poles that are equal but for rounding are not in pairs.
+            break
         poles = -np.maximum(np.abs(moved.real), _LEAST_DAMPING * np.abs(moved)) + 1j * moved.imag
         if not poles.all():
             break
