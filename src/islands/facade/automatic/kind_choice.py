@@ -5,6 +5,7 @@ recommended models are compared on the validation data, and the models of all of
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import inf, isfinite
 from types import MappingProxyType
 
@@ -19,7 +20,7 @@ from islands.facade.library_fit import LibraryFit, fit_library
 from islands.facade.trials.feedthrough_selection import advance_split
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData, prepare_data
-from islands.facade.trials.static_selection import find_static
+from islands.facade.trials.static_selection import STATIC, find_static
 from islands.progress import Steps, StoppedError
 from islands.records.averaging import AUTO as AUTO_AVERAGE
 from islands.records.dataset import Dataset
@@ -151,7 +152,7 @@ def _find_static_data(
     chosen = settings.average, settings.feedthrough, settings.delays
     if chosen != (AUTO_AVERAGE, AUTO_FEEDTHROUGH, None):
         return None
-    places = find_static(split, library, steps)
+    places = steps.attempt(STATIC, partial(find_static, split, library, steps))
     return PreparedData(advance_split(split, places), 1, places) if places else None
 
 

@@ -41,7 +41,7 @@ def find_static(split: Split, library: TrialLibrary, steps: Steps) -> tuple[int,
     """
     names = split.estimation.input_names
     late = tuple(place for place, name in enumerate(names) if not parse_channel_name(name).at_once)
-    steps(STATIC, None)
+    steps.report(STATIC, None)
     linear = assess_linear_model(split, 1, library.lags, steps=steps)
     warm_up = library.lags if linear is None else linear.warm_up
     static = assess_static_models(advance_split(split, late), 1, warm_up, steps)
