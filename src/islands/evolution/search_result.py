@@ -423,6 +423,12 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     return tuple(sorted(models, key=_ranking_key))
 
 
+def take_recommended(models: Sequence[Assessment]) -> Assessment:
+    """Return the recommended one of some models of the same data, at least one; see `recommend`."""
+    ranked = rank_models(models)
+    return ranked[recommend([measure_size(each.model) for each in ranked], ranked, False).rank - 1]
+
+
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     """Return the models with the most evidence of every class and size, best first; see `rank_models`.
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.search_result import SearchResult, rank_models
+from islands.evolution.search_result import SearchResult, take_recommended
 from islands.facade.automatic.choice import Choice
 from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
 from islands.facade.fit_settings import FitSettings
@@ -297,7 +297,8 @@ def _select_kind(
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
     least = min(errors.values())
     close = [each for each in constrained if errors[each] <= _CLOSE * least]
-    if close and check_rest(record).value and not _is_static([compared[close[0]], *static]):
+    rests = bool(close) and check_rest(record).value
+    if rests and not is_static(take_recommended([compared[close[0]], *static]).model):
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
             f"model on the validation data is {percent(errors[close[0]])} of the output "
@@ -305,13 +306,6 @@ def _select_kind(
         )
     kind, reason = recommend_kind(compared, errors)
     return kind, f"because {reason}"
-
-
-def _is_static(models: Sequence[Assessment]) -> bool:
-    """Return whether the recommended one of some models is static."""
-    ranked = rank_models(models)
-    found = recommend([measure_size(each.model) for each in ranked], ranked, False)
-    return is_static(ranked[found.rank - 1].model)
 
 
 def recommend_kind(compared: Mapping[str, Assessment], errors: Mapping[str, float]) -> tuple[str, str]:
