@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.evidence import count_terms, is_linear, measure_lack
+from islands.validation.evidence import ErrorNoise, count_terms, is_linear, measure_lack
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
 #: Difference of the evidence of two models that do not count as equal.
@@ -174,11 +174,12 @@ def _measure_lack(
     """Return the information criteria of some models, which have a bounded free run."""
     compared = [assessments[at] for at in places]
     closest = min(compared, key=lambda entry: entry.mean_square)
+    noise = ErrorNoise.fit(closest.errors, closest.split.segments)
     lack = measure_lack(
         [entry.model for entry in compared],
         [sizes[at] for at in places],
-        [entry.mean_square for entry in compared],
-        closest.effective_samples,
+        [noise.measure(entry.errors) for entry in compared],
+        noise.samples,
         terms,
     )
     return dict(zip(places, lack.tolist(), strict=True))

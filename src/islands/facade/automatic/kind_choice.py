@@ -119,8 +119,13 @@ def _choose_kind(
     simple = list_simple(data, smooth[0], settings, steps) if smooth else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
     fits.add({kind: late[kind] for kind in promising})
+    simplest = min((measure_share(each, data.split.estimation) for each in simple), default=inf)
+    others = [kind for kind in libraries if not constraint(libraries[kind].constraints).sums]
+    if simplest < min(fits.measure_errors().values(), default=0.0) and not fits.known.intersection(others):
+        rival = min(others, key=trials.errors.__getitem__)
+        fits.add({rival: late[rival]})
     errors = fits.measure_errors()
-    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors)
+    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, simplest)
     chosen, used, sentence = kind, trials.delays, _describe_delays(trials, settings, steps)
     if used and settings.delays is None:
         without = f"{kind} without dead time"
@@ -173,6 +178,11 @@ class _KindFits:
         self._record, self._data, self._simple = record, data, tuple(simple)
         self._settings, self._seed, self._steps = settings, seed, steps
         self._fits: dict[str, LibraryFit] = {}
+
+    @property
+    def known(self) -> frozenset[str]:
+        """Names of the fits."""
+        return frozenset(self._fits)
 
     @property
     def bounded(self) -> dict[str, Assessment]:
@@ -262,8 +272,9 @@ def _select_kind(
     trials: KindTrials,
     compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
+    simplest: float,
 ) -> tuple[str, str]:
-    """Return the kind and the reason."""
+    """Return the kind and the reason; the least error of the simplest models limits that of hysteresis."""
     if not record.output_range > 0.0:
         return trials.promising[0], "because the output is constant"
     if len(compared) < 2:
@@ -276,15 +287,15 @@ def _select_kind(
             f"{list_others(trials.errors, first)}"
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
-    least = min(errors.values())
-    close = [each for each in constrained if errors[each] <= _CLOSE * least]
+    close = [each for each in constrained if errors[each] <= _CLOSE * min(*errors.values(), simplest)]
     if close and check_rest(record).value:
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
             f"model on the validation data is {percent(errors[close[0]])} of the output "
             f"range of the estimation data{list_others(errors, close[0])}"
         )
-    kind, reason = recommend_kind(compared, errors)
+    others = {kind: each for kind, each in compared.items() if kind in close or kind not in constrained}
+    kind, reason = recommend_kind(others or compared, errors)
     return kind, f"because {reason}"
 
 
