@@ -24,7 +24,7 @@ from islands.records.inspection.rest import check_rest
 from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import measure_size
+from islands.validation.evidence import measure_size, name_form
 from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
 
 #: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
@@ -119,13 +119,13 @@ def _choose_kind(
     simple = list_simple(data, smooth[0], settings, steps) if smooth else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
     fits.add({kind: late[kind] for kind in promising})
-    simplest = min((measure_share(each, data.split.estimation) for each in simple), default=inf)
+    simplest = _find_least(simple, data.split.estimation)
     others = [kind for kind in libraries if not constraint(libraries[kind].constraints).sums]
     if simplest < min(fits.measure_errors().values(), default=0.0) and not fits.known.intersection(others):
         rival = min(others, key=trials.errors.__getitem__)
         fits.add({rival: late[rival]})
     errors = fits.measure_errors()
-    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, simplest)
+    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, simple)
     chosen, used, sentence = kind, trials.delays, _describe_delays(trials, settings, steps)
     if used and settings.delays is None:
         without = f"{kind} without dead time"
@@ -266,15 +266,22 @@ def measure_share(model: Assessment, record: Dataset) -> float:
     return max(model.validation_error / (record.output_range or 1.0), RESOLUTION)
 
 
+def _find_least(models: Sequence[Assessment], record: Dataset) -> float:
+    return min((measure_share(each, record) for each in models), default=inf)
+
+
 def _select_kind(
     record: Dataset,
     libraries: Mapping[str, TrialLibrary],
     trials: KindTrials,
     compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
-    simplest: float,
+    simple: Sequence[Assessment],
 ) -> tuple[str, str]:
-    """Return the kind and the reason; the least error of the simplest models limits that of hysteresis."""
+    """Return the kind and the reason; the least error of the simplest models limits that of hysteresis.
+
+    A record whose recommended model is one of the simplest is of the first kind.
+    """
     if not record.output_range > 0.0:
         return trials.promising[0], "because the output is constant"
     if len(compared) < 2:
@@ -287,7 +294,8 @@ def _select_kind(
             f"{list_others(trials.errors, first)}"
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
-    close = [each for each in constrained if errors[each] <= _CLOSE * min(*errors.values(), simplest)]
+    limit = min(*errors.values(), _find_least(simple, record))
+    close = [each for each in constrained if errors[each] <= _CLOSE * limit]
     if close and check_rest(record).value:
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
@@ -295,6 +303,11 @@ def _select_kind(
             f"range of the estimation data{list_others(errors, close[0])}"
         )
     others = {kind: each for kind, each in compared.items() if kind in close or kind not in constrained}
+    simplest = next((kind for kind in others if kind not in constrained), None)
+    entries = [*simple, *others.values()]
+    recommended = entries[recommend([measure_size(each.model) for each in entries], entries, False).rank - 1]
+    if simplest is not None and recommended in simple:
+        return simplest, f"because a model of the form {name_form(recommended.model)} has the most evidence"
     kind, reason = recommend_kind(others or compared, errors)
     return kind, f"because {reason}"
 

@@ -1,7 +1,7 @@
 """Recommended model: the simplest one with the most evidence, bounded, and with the claimed physics."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan, sqrt
 from types import SimpleNamespace
 
@@ -123,6 +123,17 @@ def test_a_check_decides_between_models_that_the_data_do_not_distinguish():
     )
     assert found.excluded == (Exclusion("physics-checks", (1,)),)
     assert chosen(Candidate(3, NOISE, bounded=False), Candidate(5, [])) == 3
+
+
+def test_a_user_who_prefers_accuracy_gets_the_most_evidence_of_the_sound_models():
+    candidates = Candidate(3, 1.03 * NOISE), Candidate(4, NOISE, estimated=0.00995)
+    entries = [each.assessment() for each in candidates]
+    assert recommend([3, 4], entries, False).rank == 1
+    found = recommend([3, 4], entries, False, accurate=True)
+    assert found.rank == 2
+    assert found.reasons[0].startswith("most evidence")
+    entries[1] = replace(candidates[1], bounded=False).assessment()
+    assert recommend([3, 4], entries, False, accurate=True).rank == 1
 
 
 def test_a_check_that_the_data_contradict_excludes_no_model():
