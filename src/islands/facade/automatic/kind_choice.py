@@ -4,7 +4,7 @@ Trials on the estimation data exclude kinds (see `try_kinds`). The others are fi
 recommended models are compared on the validation data, and the models of all of them form one front.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isfinite
 from types import MappingProxyType
 
@@ -27,8 +27,8 @@ from islands.validation.assessment import Assessment
 from islands.validation.evidence import measure_size, name_form
 from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
 
-#: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
-#: models keep that property.
+#: Largest error of hysteresis on all data, relative to the least, if the output rests while the inputs rest,
+#: because its models keep that property.
 _CLOSE = 1.25
 
 NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
@@ -119,9 +119,8 @@ def _choose_kind(
     simple = list_simple(data, smooth[0], settings, steps) if smooth else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
     fits.add({kind: late[kind] for kind in promising})
-    simplest = _find_least(simple, data.split.estimation)
     others = [kind for kind in libraries if not constraint(libraries[kind].constraints).sums]
-    if simplest < min(fits.measure_errors().values(), default=0.0) and not fits.known.intersection(others):
+    if _find_least(simple) < _find_least(fits.bounded.values()) and not fits.known.intersection(others):
         rival = min(others, key=trials.errors.__getitem__)
         fits.add({rival: late[rival]})
     errors = fits.measure_errors()
@@ -266,8 +265,9 @@ def measure_share(model: Assessment, record: Dataset) -> float:
     return max(model.validation_error / (record.output_range or 1.0), RESOLUTION)
 
 
-def _find_least(models: Sequence[Assessment], record: Dataset) -> float:
-    return min((measure_share(each, record) for each in models), default=inf)
+def _find_least(models: Iterable[Assessment]) -> float:
+    """Return the least mean square of the free runs on all data."""
+    return min((each.mean_square for each in models), default=inf)
 
 
 def _select_kind(
@@ -294,8 +294,8 @@ def _select_kind(
             f"{list_others(trials.errors, first)}"
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
-    limit = min(*errors.values(), _find_least(simple, record))
-    close = [each for each in constrained if errors[each] <= _CLOSE * limit]
+    limit = _CLOSE**2 * _find_least([*compared.values(), *simple])
+    close = [each for each in constrained if compared[each].mean_square <= limit]
     if close and check_rest(record).value:
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
