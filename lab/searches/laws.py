@@ -76,7 +76,7 @@ def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDAr
     Parameters
     ----------
     one, other : ndarray, shape (samples,)
-        `Assessment.squared_errors` on the same validation data. The numbers of samples differ if the samples
+        As of `square_errors`, on the same validation data. The numbers of samples differ if the samples
         are means of different numbers of samples; samples at the same part of the data are then compared.
 
     Returns
@@ -90,6 +90,12 @@ def compare_blocks(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDAr
     return np.array([[np.add.reduce(block) / len(block) for block in each] for each in blocks])
 
 
+def square_errors(entry: Assessment) -> NDArray[np.float64]:
+    """Return the squared errors of the free run on the validation data; none after a divergence."""
+    errors = entry.errors[entry.split.estimation.samples :]
+    return errors[:0] if np.isinf(errors).any() else errors**2
+
+
 def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the errors at the samples that both models predict."""
     if not (len(errors) and len(others)):
@@ -100,14 +106,14 @@ def _select_common(errors: NDArray[np.float64], others: NDArray[np.float64]) -> 
 
 def sound(found: SearchResult) -> list[int]:
     """Return the positions of the models that every rule may choose."""
-    bounded = [at for at, entry in enumerate(found.models) if entry.squared_errors.size]
+    bounded = [at for at, entry in enumerate(found.models) if square_errors(entry).size]
     checked = [at for at in bounded if is_sound(found.models[at].physics, found.requires_property_1)]
     return checked or bounded or [0]
 
 
 def error(entry: Assessment) -> float:
     """Return the RMSE of the free run on the validation data as a fraction of the output range."""
-    squared = entry.squared_errors
+    squared = square_errors(entry)
     return sqrt(np.mean(compare_blocks(squared, squared)[0])) if squared.size else inf
 
 
@@ -118,7 +124,7 @@ def least_error(found: SearchResult) -> int:
 
 def one_standard_error(found: SearchResult) -> int:
     """Choose the smallest model within one standard error of the least error (Breiman)."""
-    squared = found.models[least_error(found)].squared_errors
+    squared = square_errors(found.models[least_error(found)])
     blocks = compare_blocks(squared, squared)[0]
     limit = max(RESOLUTION**2, blocks.mean() + blocks.std(ddof=1) / sqrt(len(blocks)))
     return min(
@@ -132,10 +138,10 @@ def paired(standard_errors: float) -> Rule:
 
     def choose(found: SearchResult) -> int:
         best = least_error(found)
-        least = found.models[best].squared_errors
+        least = square_errors(found.models[best])
         equal = []
         for at in sound(found):
-            blocks = compare_blocks(found.models[at].squared_errors, least)
+            blocks = compare_blocks(square_errors(found.models[at]), least)
             excess = blocks[0] - blocks[1]
             limit = standard_errors * excess.std(ddof=1) / sqrt(len(excess))
             if excess.mean() <= max(limit, 0.0) or error(found.models[at]) <= RESOLUTION:

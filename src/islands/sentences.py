@@ -44,7 +44,8 @@ def write_named(template: str, group: str = "", /, **facts: Any) -> Iterator[tup
     for name in list_statements(template, group):
         text = attempt(partial(_render, loaded, name, facts))
         if isinstance(text, Failure):
-            yield name, f"(not computed: {name.removeprefix(f'{group}_')}: {text.reason})"
+            statement = (name.partition("_")[2] or name).replace("_", " ")
+            yield name, f"(not computed: {statement}: {text.reason})"
         elif text:
             yield name, text
 

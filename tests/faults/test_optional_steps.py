@@ -16,7 +16,7 @@ from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.evolution import search_result
 from islands.facade import final_models, refit
 from islands.facade.coupled import bands as coupled_bands
-from islands.facade.coupled import identification
+from islands.facade.coupled import identification, joint_models
 from islands.facade.fit import fit_record
 from islands.facade.results.fitted_model import FittedModel
 from islands.facade.results.identification import Result
@@ -156,7 +156,7 @@ COUPLED_STEPS = {
     "refinement of all equations": (identification, "_refine"),
     "residual tests of y": (CoupledAssessment, "measure_residual"),
     "figure free-run-1": (FittedModel, "plot"),
-    "y: linear model": (search_result, "assess_linear_model"),
+    "linear model": (joint_models, "identify_joint_model"),
 }
 
 

@@ -13,7 +13,7 @@ from islands.errors import ModelError
 from islands.estimation.quantity_errors import with_quantity_errors
 from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.search_state import HistoryPoint
-from islands.evolution.settings import FITNESS_MODES
+from islands.evolution.settings import ACCURATE, FITNESS_MODES
 from islands.expressions.printing import plain_factor
 from islands.models.equations import equation
 from islands.models.latent import LatentModel
@@ -169,7 +169,8 @@ class SearchResult:
             mode = FITNESS_MODES[self.settings["fitness"]]
             return recommend_fittest(self.models, mode, self.requires_property_1, unit)
         sizes = [measure_size(entry.model) for entry in self.models]
-        return recommend(sizes, self.models, self.requires_property_1, unit)
+        accurate = self.settings.get("prefer") == ACCURATE
+        return recommend(sizes, self.models, self.requires_property_1, unit, accurate)
 
     @property
     def recommended(self) -> Assessment:

@@ -57,6 +57,9 @@ OVERLONG: Mapping[str, str] = MappingProxyType(
     {"truncate": "the last genes are left out", "parent": "a parent takes the place of the child"}
 )
 
+#: What counts among models that the data do not distinguish.
+PREFERENCES = (READABLE, ACCURATE) = ("readable", "accurate")
+
 #: What recommends a model of the result, by name.
 SELECTIONS: Mapping[str, str] = MappingProxyType(
     {
@@ -248,6 +251,13 @@ class Settings:
         "`all` estimates the parameters of the ranked models again in the end, on all data. The errors of "
         "the result remain those of the parameters before, since no data are left to measure the others.",
         choices=REFITS,
+    )
+    prefer: str = setting(
+        READABLE,
+        "Which of the models that the data do not distinguish is recommended: `readable`, a linear one or "
+        "the smallest, or `accurate`, the one with the most evidence in the free run on all data.",
+        choices=PREFERENCES,
+        daily=True,
     )
     select: str = setting(
         "validation",

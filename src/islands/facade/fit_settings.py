@@ -11,7 +11,7 @@ from islands.records.input_lead import check_feedthrough
 from islands.settings_schema import Integer, list_changes, setting, setting_of, settings_class
 
 #: Settings of models of every class.
-_COMMON = frozenset({"model", "refit"})
+_COMMON = frozenset({"model", "refit", "prefer"})
 
 
 @settings_class
@@ -49,6 +49,7 @@ class FitSettings:
     )
     estimator: str = setting_of(Settings, "estimator", "")
     refit: str = setting_of(Settings, "refit", "none")
+    prefer: str = setting_of(Settings, "prefer", daily=True)
     average: Integer | str = setting_of(Settings, "average", AUTO)
     feedthrough: str = setting_of(Settings, "feedthrough", AUTO)
     shooting: Integer | None = setting_of(Settings, "shooting", None)

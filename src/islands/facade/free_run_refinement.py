@@ -7,6 +7,7 @@ recommended, terms whose parameters are within two standard errors of zero are t
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -28,6 +29,7 @@ from islands.models.regressor import Regressor
 from islands.parallel import map_over_record
 from islands.progress import Steps
 from islands.rounding import RESOLUTION
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, assess
 
@@ -129,17 +131,20 @@ class _Reduction:
 
     def _eliminate(self, entry: Assessment | None) -> Iterator[Assessment]:
         while entry and (kept := _keep_significant(entry, self._is_far)):
-            entry = self._estimate(kept, entry.criterion)
+            entry = self._estimate(kept, entry)
             if entry:
                 yield entry
 
-    def _estimate(self, terms: tuple[Regressor, ...], criterion: Criterion | None) -> Assessment | None:
-        found = estimate(terms, self._split.estimation, *self._limits)
+    def _estimate(self, terms: tuple[Regressor, ...], larger: Assessment) -> Assessment | None:
+        """Return a model with some terms of a larger one, whose free run has no noise and gives the start."""
+        is_simulated, record = larger.criterion == _FREE_RUN, self._split.estimation
+        if is_simulated:
+            run = simulate_freely(larger.model, record, self._limits[1])
+            record = replace(record, y=np.where(np.isnan(run.y), record.y, run.y))
+        found = estimate(terms, record, *self._limits)
         if isinstance(found, EvaluationOutcome):
             return None
-        if criterion == _FREE_RUN:
-            return self.refine(found.model)
-        return self._assess(found.model, LEAST_SQUARES)
+        return self.refine(found.model) if is_simulated else self._assess(found.model, LEAST_SQUARES)
 
     def _assess(self, model: DynamicModel, criterion: Criterion) -> Assessment:
         constraints, warm_up = self._limits

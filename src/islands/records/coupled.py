@@ -168,6 +168,11 @@ class CoupledSplit:
     record: CoupledRecord
 
     @property
+    def segments(self) -> tuple[int, ...]:
+        """Lengths of the recordings of both parts in samples."""
+        return self.estimation.segments + self.validation.segments
+
+    @property
     def first(self) -> Split:
         """Data of the first output, with the inputs that all outputs share."""
         return Split(self.estimation.records[0], self.validation.records[0])

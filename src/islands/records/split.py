@@ -49,6 +49,11 @@ class Split:
     estimation: Dataset
     validation: Dataset
 
+    @property
+    def segments(self) -> tuple[int, ...]:
+        """Lengths of the recordings of both parts in samples."""
+        return self.estimation.segments + self.validation.segments
+
     def __post_init__(self) -> None:
         matched = match_record(self.estimation, self.validation, "the estimation data", "the validation data")
         object.__setattr__(self, "validation", matched)

@@ -23,7 +23,7 @@ from islands.rounding import RESOLUTION
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
-from islands.validation.evidence import count_effective
+from islands.validation.evidence import join_errors
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
@@ -141,8 +141,7 @@ class Assessment:
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
     errors : ndarray, shape (samples,)
-        Error of the free run at every sample of the validation data, as a fraction of the output range. NaN
-        in the warm-up. Empty if the free run diverged.
+        Errors of the free runs on the estimation data and on the validation data; see `join_errors`.
     constraints : tuple of ConstraintCheck
         The constraints, each with its target and the value of the model.
     recordings : mapping
@@ -196,27 +195,12 @@ class Assessment:
 
         Errors below the resolution of files are equal; infinite after a divergence.
         """
-        split = self.checks.split
-        parts = zip(PARTS, (split.estimation, split.validation), strict=True)
-        squares = [self.metrics[part]["free_run"].rmse ** 2 * record.samples for part, record in parts]
-        samples, scale = (
-            split.estimation.samples + split.validation.samples,
-            split.estimation.output_range or 1.0,
-        )
-        mean = sum(squares) / samples / scale**2
-        return inf if isnan(mean) else max(mean, RESOLUTION**2)
+        return max(float(np.nanmean(self.errors**2)), RESOLUTION**2)
 
     @property
-    def effective_samples(self) -> float:
-        """Number of independent samples of all data; see `count_effective`."""
-        split = self.checks.split
-        return count_effective(self.errors, split.estimation.samples + split.validation.samples)
-
-    @property
-    def squared_errors(self) -> NDArray[np.float64]:
-        """Squares of the errors, shape (samples,)."""
-        with np.errstate(over="ignore"):
-            return self.errors**2
+    def split(self) -> Split:
+        """Estimation data and validation data."""
+        return self.checks.split
 
     @property
     def physics(self) -> PhysicsChecks:
@@ -306,7 +290,7 @@ def assess(
         _compute_information(split.estimation, runs["estimation"]["one_step_ahead"], free),
         Checks(model, split, warm_up),
         first,
-        _compute_errors(split.validation, runs["validation"]["free_run"]),
+        join_errors(*((getattr(split, part), runs[part]["free_run"]) for part in PARTS)),
         check_constraints(model, constraints),
         recordings,
         criterion=criterion,
@@ -343,10 +327,6 @@ def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Me
     if len(rows) == 1:
         return {}
     return {name: metrics(record.y[each], run.y[each], record.output_range) for name, each in rows.items()}
-
-
-def _compute_errors(record: Dataset, run: Simulation) -> NDArray[np.float64]:
-    return (record.y - run.y) / (record.output_range or 1.0) if run.outcome else np.empty(0)
 
 
 def _compute_information(record: Dataset, one_step: Simulation, free: int) -> InformationCriteria:

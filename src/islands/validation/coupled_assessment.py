@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, isnan, log, nan
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from islands.records.coupled import CoupledRecord, CoupledSplit
 from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.validation.assessment import PARTS
-from islands.validation.evidence import count_effective
+from islands.validation.evidence import join_errors
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import OutputBands
@@ -84,52 +84,23 @@ class CoupledAssessment:
 
     @cached_property
     def errors(self) -> NDArray[np.float64]:
-        """Error of the common free run at every sample of the validation data, relative to the ranges.
-
-        Shape (samples, outputs); NaN in the warm-up, and everywhere after a divergence.
-        """
-        data = self.split.validation
-        run = free_run(self.model, data, self.warm_up)
-        ranges = np.array([each.output_range or 1.0 for each in data.records])
-        found: NDArray[np.float64] = (run.y - data.y) / ranges
-        return found if run.outcome else found * nan
-
-    @property
-    def squared_errors(self) -> NDArray[np.float64]:
-        """Mean over the outputs of the squares of the errors, shape (samples,); empty after a divergence."""
-        squares: NDArray[np.float64] = np.mean(self.errors**2, axis=1)
-        return squares if np.isfinite(squares).any() else squares[:0]
+        """Errors of the common free runs on both parts of the data; see `join_errors`."""
+        parts = (self.split.estimation, self.split.validation)
+        return join_errors(*((part, free_run(self.model, part, self.warm_up)) for part in parts))
 
     @property
     def validation_error(self) -> float:
-        """Root of the mean of these squares; infinite after a divergence."""
-        squares = self.squared_errors
-        return float(np.sqrt(np.nanmean(squares))) if squares.size else inf
+        """Root mean square of the errors on the validation data; infinite after a divergence."""
+        return float(np.sqrt(np.nanmean(self.errors[self.split.estimation.samples :] ** 2)))
 
     @property
     def mean_square(self) -> float:
         """Geometric mean over the outputs of the mean squared error of the common free run on all data.
 
-        The likelihood of independent normal errors with unknown variances depends on it. Errors below the
-        resolution of files are equal; infinite after a divergence.
+        Errors below the resolution of files are equal; infinite after a divergence.
         """
-        logarithms = []
-        records = zip(self.split.estimation.records, self.split.validation.records, strict=True)
-        for parts, errors in zip(records, self.metrics.values(), strict=True):
-            squares = [
-                errors[part]["free_run"].rmse ** 2 * each.samples
-                for part, each in zip(PARTS, parts, strict=True)
-            ]
-            scale = parts[0].output_range or 1.0
-            mean = sum(squares) / sum(each.samples for each in parts) / scale**2
-            logarithms.append(inf if isnan(mean) else log(max(mean, RESOLUTION**2)))
-        return float(np.exp(np.mean(logarithms)))
-
-    @property
-    def effective_samples(self) -> float:
-        """Number of independent errors of all outputs; see `Assessment.effective_samples`."""
-        samples = self.split.estimation.samples + self.split.validation.samples
-        return sum(count_effective(each, samples) for each in self.errors.T)
+        squares = np.maximum(np.nanmean(self.errors**2, axis=0), RESOLUTION**2)
+        return float(np.exp(np.mean(np.log(squares))))
 
     def measure_residual(self, place: int) -> ResidualStructure:
         """Measure the residuals of an output on the longest recording of the validation data."""

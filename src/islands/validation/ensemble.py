@@ -14,7 +14,6 @@ of them: the shortest, and of equal sizes the recommended one.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import inf
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -26,13 +25,12 @@ from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.records.coupled import AnyRecord, CoupledSplit
 from islands.records.dataset import Dataset
-from islands.records.signal_map import match_rate
 from islands.records.split import Split
-from islands.rounding import RESOLUTION, ROUNDING
-from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs, simulate_freely
+from islands.rounding import ROUNDING
+from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs
 from islands.simulation.predictors import free_run, free_runs
 from islands.validation.equal_laws import find_laws
-from islands.validation.evidence import count_effective, count_terms, measure_lack, measure_size
+from islands.validation.evidence import ErrorNoise, count_terms, join_errors, measure_lack, measure_size
 
 M = TypeVar("M", bound=AnyModel)
 
@@ -331,19 +329,16 @@ def _weigh(
     models: list[AnyModel] = [candidate.model for candidate in candidates]
     if not models:
         return []
-    squares = np.array([each.error for each in candidates])
-    samples = _count_independent(models[int(squares.argmin())], split, warm_up)
+    closest = min(candidates, key=lambda each: each.error).model
+    noise = ErrorNoise.fit(_measure_errors(closest, split, warm_up), split.segments)
+    squares = [noise.measure(_measure_errors(model, split, warm_up)) for model in models]
     sizes, terms = [measure_size(model) for model in models], count_terms(models)
-
-    def measure() -> NDArray[np.float64]:
-        return measure_lack(models, sizes, np.maximum(squares, RESOLUTION**2), samples, terms)
-
-    lack = measure()
+    lack = measure_lack(models, sizes, squares, noise.samples, terms)
     # An estimate of initial outputs that the error lacks changes it by less than this part.
-    reach = -samples * np.log1p(-LEAST_SHARE) - 2.0 * np.log(_MIN_WEIGHT)
+    reach = -noise.samples * np.log1p(-LEAST_SHARE) - 2.0 * np.log(_MIN_WEIGHT)
     for at in np.flatnonzero(lack <= lack.min() + reach):
-        squares[at] -= _measure_start_noise(models[at], split, warm_up)
-    lack = measure()
+        squares[at] = noise.measure(_measure_errors(models[at], split, warm_up, least_share=0.0))
+    lack = measure_lack(models, sizes, squares, noise.samples, terms)
     weights = np.exp(0.5 * (lack.min() - lack))
     weights /= weights.sum()
     order = [int(index) for index in np.argsort(-weights, kind="stable") if weights[index] >= _MIN_WEIGHT]
@@ -358,48 +353,29 @@ def _weigh(
 def measure_square(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:
     """Return the mean squared error of the free run on all data, relative to the squared output range.
 
-    With several outputs, it is the geometric mean of their errors (see `mean_squares`). Infinite after a
-    divergence.
+    With several outputs, it is the geometric mean of their errors. Infinite after a divergence.
     """
-    total = 0.0
-    for record in (split.estimation, split.validation):
-        run = simulate_freely(model, record, warm_up)
-        if not run.outcome:
-            return inf
-        total += float(mean_squares(record, run.y[None], find_predicted(run.y))[0]) * record.samples
-    return total / (split.estimation.samples + split.validation.samples) / _scale(split.estimation)
+    squares = np.nanmean(_measure_errors(model, split, warm_up) ** 2, axis=0)
+    return float(np.exp(np.mean(np.log(squares + ROUNDING**2))))
 
 
-def _scale(record: AnyRecord) -> float:
-    """Return the square to which the mean squares of a record are relative; those of several outputs are."""
-    return (record.output_range or 1.0) ** 2 if isinstance(record, Dataset) else 1.0
+def _measure_errors(
+    model: AnyModel, split: Split | CoupledSplit, warm_up: int, least_share: float = LEAST_SHARE
+) -> NDArray[np.float64]:
+    """Return the errors of the free runs on all data; see `join_errors`.
 
-
-def _count_independent(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:
-    """Return the number of independent errors of all outputs on all data."""
-    run = simulate_freely(model, split.validation, warm_up)
-    errors = (split.validation.y - run.y).reshape(split.validation.samples, -1)
-    samples = split.estimation.samples + split.validation.samples
-    return sum(count_effective(each, samples) for each in errors.T)
-
-
-def _measure_start_noise(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:
-    """Return the part of the relative mean square of `measure_square` that the initial outputs contribute.
-
-    The initial outputs are parameters of each model. The noise of the measured ones decays more slowly in a
-    model with fewer past outputs.
+    With ``least_share=0``, the initial outputs are parameters of the model, and the errors in the warm-up are
+    those of the measured ones: their noise decays more slowly in a model with fewer past outputs.
     """
-    total, samples = 0.0, split.estimation.samples + split.validation.samples
+    parts = []
     for record in (split.estimation, split.validation):
-        started = estimate_initial_outputs(model, record, warm_up, least_share=0.0)
-        if started is record or not isinstance(record, Dataset):
-            continue
+        started = estimate_initial_outputs(model, record, warm_up, least_share)
         run = free_run(model, started, warm_up)
-        changes: NDArray[np.float64] = started.y - match_rate(model, record).y
-        likely = run.mean_squared_error + np.nansum(changes**2) / np.count_nonzero(find_predicted(run.y))
-        measured = float(simulate_freely(model, record, warm_up).mean_squared_error)
-        total += max(0.0, measured - likely) * record.samples
-    return total / samples / _scale(split.estimation)
+        if least_share == 0.0 and started is not record and isinstance(record, Dataset):
+            y = np.where(np.isnan(run.y), started.y, run.y)
+            run = replace(run, y=y)
+        parts.append((record, run))
+    return join_errors(*parts)
 
 
 def effective_samples(residual: NDArray[np.float64]) -> float:

@@ -1,14 +1,16 @@
 """Evidence of models: the information criterion of their free runs on all data.
 
-The criterion is the logarithm of the mean squared error, and a penalty for every parameter (Schwarz, Annals
-of Statistics 6 (1978) 461-464) and for the choice of every term among many (Chen & Chen, Biometrika 95 (2008)
-759-771). Errors that follow each other are correlated: the number of independent ones counts. The data from
-which the parameters are estimated count as well: after one step or one bump, the rest of the record has no
-excitation, and a constant is as good there as any model.
+The criterion is the logarithm of the mean square of the whitened errors, and a penalty for every parameter
+(Schwarz, Annals of Statistics 6 (1978) 461-464) and for the choice of every term among many (Chen & Chen,
+Biometrika 95 (2008) 759-771). The noise model that whitens is that of the closest model, for all of them: a
+slow error counts little where the noise is slow, and much where it is white. The data from which the
+parameters are estimated count as well: after one step or one bump, the rest of the record has no excitation,
+and a constant is as good there as any model.
 """
 
 from collections.abc import Sequence
-from math import isqrt, log
+from dataclasses import dataclass
+from math import inf, log
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +20,11 @@ from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.records.channel_names import parse_channel_name
+from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.noise_model import NoiseModel, fit_noise
+from islands.records.segments import count_runs
+from islands.rounding import RESOLUTION
+from islands.simulation.predictors import Simulation
 
 _ONE = Constant(1.0)
 
@@ -83,17 +90,78 @@ def measure_size(model: AnyModel) -> float:
     return model.free_size - 0.5 * (has_constant or has_level)
 
 
-def count_effective(errors: NDArray[np.float64], samples: int) -> float:
-    """Return how many of the samples are independent, by the autocorrelation of errors; NaN is left out.
+def join_errors(*parts: tuple[AnyRecord, Simulation]) -> NDArray[np.float64]:
+    """Return the errors of the free runs on parts of the data, relative to the output ranges of the first.
 
-    The variance of a mean of squares of correlated normal values is that of so many independent ones.
+    Parameters
+    ----------
+    *parts : tuple of Dataset or CoupledRecord, and Simulation
+
+    Returns
+    -------
+    ndarray, shape (samples,) or (samples, outputs)
+        NaN in the warm-up of a free run, infinite on a part whose free run diverged.
     """
-    known = errors[~np.isnan(errors)]
-    power, lags = float(np.add.reduce(known**2)), range(1, isqrt(known.size) + 1)
-    if not power > 0.0:
-        return float(samples)
-    correlations = [float(np.add.reduce(known[lag:] * known[:-lag])) / power for lag in lags]
-    return max(2.0, samples / (1.0 + 2.0 * sum(each**2 for each in correlations)))
+    first = parts[0][0]
+    records = first.records if isinstance(first, CoupledRecord) else (first,)
+    ranges = np.array([each.output_range or 1.0 for each in records])
+    errors = [record.y - run.y if run.outcome else np.full(record.y.shape, inf) for record, run in parts]
+    relative: NDArray[np.float64] = np.concatenate(errors) / (
+        ranges if isinstance(first, CoupledRecord) else ranges[0]
+    )
+    return relative
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorNoise:
+    """Noise of the errors of free runs: what remains of them is compared between models.
+
+    Attributes
+    ----------
+    models : tuple of NoiseModel
+        Of every output.
+    segments : tuple of int
+        Lengths of the recordings in samples.
+    samples : int
+        Number of known errors of all outputs.
+    """
+
+    models: tuple[NoiseModel, ...]
+    segments: tuple[int, ...]
+    samples: int
+
+    @classmethod
+    def fit(cls, errors: NDArray[np.float64], segments: Sequence[int]) -> "ErrorNoise":
+        """Fit the noise of every output.
+
+        Parameters
+        ----------
+        errors : ndarray, shape (samples,) or (samples, outputs)
+            Errors of the closest model, as of `join_errors`.
+        segments : sequence of int
+        """
+        columns = errors.reshape(len(errors), -1).T
+        known = np.isfinite(columns)
+        models = (
+            fit_noise(column[each], segments=count_runs(each, segments))
+            for column, each in zip(columns, known, strict=True)
+        )
+        return cls(tuple(models), tuple(segments), int(np.count_nonzero(known)))
+
+    def measure(self, errors: NDArray[np.float64]) -> float:
+        """Return the mean square of whitened errors; infinite after a divergence.
+
+        Errors below the resolution of files are equal. With several outputs, it is the geometric mean: the
+        likelihood of independent normal errors with unknown variances depends on it.
+        """
+        logarithms = []
+        for noise, column in zip(self.models, errors.reshape(len(errors), -1).T, strict=True):
+            known = ~np.isnan(column)
+            if not (known.any() and np.isfinite(column[known]).all()):
+                return inf
+            whitened = noise.whiten(column[known], count_runs(known, self.segments))
+            logarithms.append(log(float(np.mean(whitened**2)) + RESOLUTION**2))
+        return float(np.exp(np.mean(logarithms)))
 
 
 def count_terms(models: Sequence[AnyModel]) -> int:
@@ -105,7 +173,7 @@ def measure_lack(
     models: Sequence[AnyModel],
     sizes: Sequence[float],
     squares: ArrayLike,
-    samples: float,
+    samples: int,
     terms: int,
 ) -> NDArray[np.float64]:
     """Return the information criteria of models, less of one with more evidence.
@@ -116,9 +184,9 @@ def measure_lack(
     sizes : sequence of float
         As of `measure_size`.
     squares : array of shape (models,)
-        Mean squared errors of the free runs, positive.
-    samples : float
-        Number of independent errors.
+        As of `ErrorNoise.measure`, positive.
+    samples : int
+        Number of errors.
     terms : int
         Number of terms among which equations choose. A curve is chosen among about as many.
     """

@@ -1,8 +1,8 @@
 """Choice of one model among the ranked models of a search, by their evidence.
 
 A difference of ten is very strong evidence (Kass & Raftery, J. American Statistical Association 90 (1995)
-773-795). Models that differ by less are equal: a linear one comes first, then the smallest. See
-`islands.validation.evidence`.
+773-795). Models that differ by less are equal: a linear one comes first, then the smallest. If the user
+prefers accuracy, the one with the most evidence comes first. See `islands.validation.evidence`.
 
 The measured data are the evidence. The physics checks simulate inputs that the record does not contain, and a
 system may diverge at them as its models do: a reaction that runs away, a spring that softens. The checks
@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.evidence import count_terms, is_linear, is_static, measure_lack
+from islands.validation.evidence import ErrorNoise, count_terms, is_linear, is_static, measure_lack
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 
 #: Difference of the evidence of two models that do not count as equal.
@@ -93,7 +93,11 @@ class _Selection:
 
 
 def recommend(
-    sizes: Sequence[float], assessments: Sequence[Assessment], hysteresis: bool, unit: str = ""
+    sizes: Sequence[float],
+    assessments: Sequence[Assessment],
+    hysteresis: bool,
+    unit: str = "",
+    accurate: bool = False,
 ) -> Recommendation:
     """Choose the simplest of the models with the most evidence.
 
@@ -112,6 +116,8 @@ def recommend(
         Whether models need Property 1.
     unit : str
         Unit of the output, for the reasons.
+    accurate : bool
+        Whether the model with the most evidence is recommended, of those that are left.
     """
     bounded = [at for at, entry in enumerate(assessments) if entry.outcomes["validation"]["free_run"]]
     if not bounded:
@@ -128,14 +134,18 @@ def recommend(
     limit = lack[reference] + DECISIVE
     selection.keep(EVIDENCE, [at for at in selection.left if lack[at] <= limit])
     selection.keep(CHECKS, [at for at in selection.left if is_sound(assessments[at].physics, hysteresis)])
-    chosen = _take_simplest(selection.left, sizes, assessments, lack)
+    chosen = (
+        min(selection.left, key=lambda at: (lack[at], at))
+        if accurate
+        else _take_simplest(selection.left, sizes, assessments, lack)
+    )
     found = Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
     model = assessments[chosen].model
     reasons = (
         f"static: {model.output_name} depends on the inputs of the same sample only"
         if is_static(model)
         else "",
-        _describe_choice(found, sizes, assessments, unit),
+        _describe_choice(found, sizes, assessments, unit, accurate),
         _describe_physics(found, assessments, hysteresis, unit),
     )
     return replace(found, reasons=tuple(filter(None, reasons)))
@@ -183,11 +193,12 @@ def _measure_lack(
     """Return the information criteria of some models, which have a bounded free run."""
     compared = [assessments[at] for at in places]
     closest = min(compared, key=lambda entry: entry.mean_square)
+    noise = ErrorNoise.fit(closest.errors, closest.split.segments)
     lack = measure_lack(
         [entry.model for entry in compared],
         [sizes[at] for at in places],
-        [entry.mean_square for entry in compared],
-        closest.effective_samples,
+        [noise.measure(entry.errors) for entry in compared],
+        noise.samples,
         terms,
     )
     return dict(zip(places, lack.tolist(), strict=True))
@@ -270,7 +281,11 @@ def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
 
 
 def _describe_choice(
-    found: Recommendation, sizes: Sequence[float], assessments: Sequence[Assessment], unit: str
+    found: Recommendation,
+    sizes: Sequence[float],
+    assessments: Sequence[Assessment],
+    unit: str,
+    accurate: bool,
 ) -> str:
     """State the criterion, the errors, and the excluded models that the criterion would prefer."""
     chosen, best = (assessments[rank - 1] for rank in (found.rank, found.reference or found.rank))
@@ -281,13 +296,13 @@ def _describe_choice(
         for each in list_rivals(found, sizes, assessments)
     ]
     end = f"; left out: {' and '.join(rivals)}" if rivals else ""
+    if chosen is best or accurate:
+        return f"most evidence ({criterion}), RMSE on the validation data {error}{end}"
     if is_linear(chosen.model) and any(not is_linear(each.model) for each in assessments):
         return (
             f"linear: no nonlinear model has decisively more evidence ({criterion}); RMSE on the validation "
             f"data {error}{end}"
         )
-    if chosen is best:
-        return f"most evidence ({criterion}), RMSE on the validation data {error}{end}"
     return (
         f"smallest of the models whose evidence ({criterion}) does not differ decisively: RMSE on the "
         f"validation data {error}, {least} of the model with the most evidence{end}"

@@ -4,7 +4,7 @@ Trials on the estimation data exclude kinds (see `try_kinds`). The others are fi
 recommended models are compared on the validation data, and the models of all of them form one front.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from math import inf, isfinite
 from types import MappingProxyType
@@ -29,11 +29,11 @@ from islands.records.inspection.rest import check_rest
 from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import is_static, measure_size
+from islands.validation.evidence import is_static, measure_size, name_form
 from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
 
-#: Largest error of hysteresis relative to the least if the output rests while the inputs rest, because its
-#: models keep that property.
+#: Largest error of hysteresis on all data, relative to the least, if the output rests while the inputs rest,
+#: because its models keep that property.
 _CLOSE = 1.25
 
 NO_DEAD_TIME = "No dead time beyond the lags of the library was found."
@@ -125,9 +125,12 @@ def _choose_kind(
     simple = list_simple(data, smooth[0], settings, steps) if smooth else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
     fits.add({kind: late[kind] for kind in promising})
+    others = [kind for kind in libraries if not constraint(libraries[kind].constraints).sums]
+    if _find_least(simple) < _find_least(fits.bounded.values()) and not fits.known.intersection(others):
+        rival = min(others, key=trials.errors.__getitem__)
+        fits.add({rival: late[rival]})
     errors = fits.measure_errors()
-    static = [each for each in simple if is_static(each.model)]
-    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, static)
+    kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, simple)
     chosen, used, sentence = kind, trials.delays, _describe_delays(trials, settings, steps)
     if used and settings.delays is None:
         without = f"{kind} without dead time"
@@ -191,6 +194,11 @@ class _KindFits:
         self._record, self._data, self._simple = record, data, tuple(simple)
         self._settings, self._seed, self._steps = settings, seed, steps
         self._fits: dict[str, LibraryFit] = {}
+
+    @property
+    def known(self) -> frozenset[str]:
+        """Names of the fits."""
+        return frozenset(self._fits)
 
     @property
     def bounded(self) -> dict[str, Assessment]:
@@ -274,15 +282,24 @@ def measure_share(model: Assessment, record: Dataset) -> float:
     return max(model.validation_error / (record.output_range or 1.0), RESOLUTION)
 
 
+def _find_least(models: Iterable[Assessment]) -> float:
+    """Return the least mean square of the free runs on all data."""
+    return min((each.mean_square for each in models), default=inf)
+
+
 def _select_kind(
     record: Dataset,
     libraries: Mapping[str, TrialLibrary],
     trials: KindTrials,
     compared: Mapping[str, Assessment],
     errors: Mapping[str, float],
-    static: Sequence[Assessment],
+    simple: Sequence[Assessment],
 ) -> tuple[str, str]:
-    """Return the kind and the reason; a static model keeps the property of hysteresis as well."""
+    """Return the kind and the reason; the least error of the simplest models limits that of hysteresis.
+
+    A static model keeps the property of hysteresis as well. A record whose recommended model is one of the
+    simplest is of the first kind.
+    """
     if not record.output_range > 0.0:
         return trials.promising[0], "because the output is constant"
     if len(compared) < 2:
@@ -295,16 +312,25 @@ def _select_kind(
             f"{list_others(trials.errors, first)}"
         )
     constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
-    least = min(errors.values())
-    close = [each for each in constrained if errors[each] <= _CLOSE * least]
+    limit = _CLOSE**2 * _find_least([*compared.values(), *simple])
+    close = [each for each in constrained if compared[each].mean_square <= limit]
     rests = bool(close) and check_rest(record).value
-    if rests and not is_static(take_recommended([compared[close[0]], *static]).model):
+    if rests and not is_static(take_recommended([compared[close[0]], *simple]).model):
         return close[0], (
             f"because the output rests while the inputs rest, and the free-run RMSE of its recommended "
             f"model on the validation data is {percent(errors[close[0]])} of the output "
             f"range of the estimation data{list_others(errors, close[0])}"
         )
-    kind, reason = recommend_kind(compared, errors)
+    others = {kind: each for kind, each in compared.items() if kind in close or kind not in constrained}
+    simplest = next((kind for kind in others if kind not in constrained), None)
+    if simplest is not None:
+        recommended = take_recommended([*simple, *others.values()])
+        if recommended in simple:
+            return (
+                simplest,
+                f"because a model of the form {name_form(recommended.model)} has the most evidence",
+            )
+    kind, reason = recommend_kind(others or compared, errors)
     return kind, f"because {reason}"
 
 

@@ -219,7 +219,7 @@ def exceeds_equations(
         (entry.model, entry.model),
         (entry.size, len(errors)),
         (entry.mean_square, np.exp(np.mean(np.log(np.square(errors))))),
-        entry.effective_samples,
+        entry.errors.size,
         1,
     )
     return bool(tried > known + DECISIVE)

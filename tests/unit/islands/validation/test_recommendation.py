@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.validation.assessment import Assessment
@@ -19,18 +20,11 @@ LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 #: Squared errors of white noise with an RMSE of 1 %.
 NOISE = 1e-4 * np.random.default_rng(0).standard_normal(200) ** 2
 
-#: Signs of white noise.
+#: White noise of variance 1: the errors of a `Candidate` on the estimation data, and the signs of the others.
 WHITE = np.random.default_rng(1).choice([-1.0, 1.0], 1000)
 
 #: Samples of the estimation data of a `Candidate`.
 SAMPLES = 600
-
-
-#: Both parts of the data have an output range of 1.
-SPLIT = SimpleNamespace(
-    estimation=SimpleNamespace(samples=SAMPLES, output_range=1.0),
-    validation=SimpleNamespace(samples=len(NOISE), output_range=1.0),
-)
 
 
 @dataclass(frozen=True)
@@ -43,7 +37,7 @@ class Candidate:
     ranges: float = 0.0
     drift: float = 0.0
     estimated: float = 0.01
-    signs: np.ndarray | None = None
+    errors: np.ndarray | None = None
 
     def assessment(self):
         physics = PhysicsChecks(
@@ -69,10 +63,14 @@ class Candidate:
             },
             {"validation": {"free_run": OK if known else LOST}},
             None,
-            SimpleNamespace(physics=physics, split=SPLIT),
+            SimpleNamespace(physics=physics, split=SimpleNamespace(segments=())),
             0,
-            (WHITE[: len(self.blocks)] if self.signs is None else self.signs) * np.sqrt(self.blocks),
+            self.make_errors() if self.errors is None else self.errors,
         )
+
+    def make_errors(self):
+        validation = WHITE[SAMPLES:][: len(self.blocks)] * np.sqrt(self.blocks)
+        return np.append(self.estimated * WHITE[:SAMPLES], validation if len(self.blocks) else np.inf)
 
 
 def chosen(*candidates, hysteresis=False):
@@ -98,12 +96,12 @@ def test_the_estimation_data_count_where_the_validation_data_rest():
     assert chosen(Candidate(1, NOISE, estimated=0.3), Candidate(4, 1.01 * NOISE)) == 4
 
 
-def test_correlated_errors_count_as_fewer_samples():
-    drift = np.repeat(NOISE[:10], 20)
-    signs = np.ones(len(drift))
-    slow = Candidate(9, drift)
-    assert chosen(Candidate(3, 1.1 * drift, estimated=0.0105, signs=signs), replace(slow, signs=signs)) == 3
-    assert chosen(Candidate(3, 1.1 * drift, estimated=0.0105), slow) == 9
+@pytest.mark.parametrize(("pole", "size"), [(0.0, 9), (0.98, 3)])
+def test_a_slow_error_counts_little_where_the_noise_is_slow(pole, size):
+    noise = lfilter([0.01 * sqrt(1.0 - pole**2)], [1.0, -pole], np.random.default_rng(0).standard_normal(800))
+    slow = 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 800))
+    errors = noise + slow - slow * (slow @ noise) / (slow @ slow)  # the larger model has the smaller errors
+    assert chosen(Candidate(3, 1.1 * NOISE, errors=errors), Candidate(9, NOISE, errors=errors - slow)) == size
 
 
 def test_samples_without_a_prediction_do_not_hide_a_large_validation_error():
@@ -125,6 +123,17 @@ def test_a_check_decides_between_models_that_the_data_do_not_distinguish():
     )
     assert found.excluded == (Exclusion("physics-checks", (1,)),)
     assert chosen(Candidate(3, NOISE, bounded=False), Candidate(5, [])) == 3
+
+
+def test_a_user_who_prefers_accuracy_gets_the_most_evidence_of_the_sound_models():
+    candidates = Candidate(3, 1.03 * NOISE), Candidate(4, NOISE, estimated=0.00995)
+    entries = [each.assessment() for each in candidates]
+    assert recommend([3, 4], entries, False).rank == 1
+    found = recommend([3, 4], entries, False, accurate=True)
+    assert found.rank == 2
+    assert found.reasons[0].startswith("most evidence")
+    entries[1] = replace(candidates[1], bounded=False).assessment()
+    assert recommend([3, 4], entries, False, accurate=True).rank == 1
 
 
 def test_a_check_that_the_data_contradict_excludes_no_model():

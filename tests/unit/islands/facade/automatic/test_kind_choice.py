@@ -15,6 +15,7 @@ from islands.facade.fit_settings import FitSettings
 from islands.progress import ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import split
+from islands.validation.evidence import name_form
 from support.assessments import with_changes
 from support.known_records import runaway
 from support.portfolio_records import KINDS as RECORDS
@@ -93,6 +94,7 @@ def test_a_slow_room_is_linear_and_has_its_gains():
     measured = np.round(y + 0.05 * rng.standard_normal(2400), 1)
     choice, result = choose(Dataset(np.column_stack([heating, outside]), measured, 600.0))
     assert choice.kind == "smooth"
+    assert name_form(result.recommended.model) == "linear"
     system = islands.linearise(result.recommended.model)
     assert system.poles == pytest.approx([pole], abs=5e-4)
     assert system.static_gain[0] == pytest.approx([8.0, 1.0], rel=0.1)
@@ -108,12 +110,24 @@ def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
     models = {"smooth": law, "magnitude": with_changes(larger, physics=bounded)}
     errors = {kind: measure_share(each, data) for kind, each in models.items()}
     libraries = dict.fromkeys(models, SimpleNamespace(constraints="none"))
-    kind, reason = _select_kind(data, libraries, None, models, errors)
+    kind, reason = _select_kind(data, libraries, None, models, errors, ())
     assert kind == "magnitude"
     assert "; left out: smooth with a divergence at inputs held at 0.8 times their" in reason
-    kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors)
+    kind, reason = _select_kind(data, libraries, None, models | {"magnitude": larger}, errors, ())
     assert kind == "smooth"
     assert "left out" not in reason
+
+
+def test_a_level_that_integrates_is_not_taken_for_hysteresis():
+    """It rests at the balance of its inputs, and a constant is the best trial of the last samples."""
+    pump = np.ones(400)
+    pump[50:180], pump[300:] = 1.2, 0.9
+    level = 30.0 + np.append(0.0, np.cumsum(0.18 * (pump[:-1] - 1.0)))
+    data = Dataset(pump, level + 0.03 * np.random.default_rng(1).standard_normal(400), 60.0)
+    choice, result = choose(data)
+    assert min(choice.trials, key=choice.trials.__getitem__) == "hysteresis" != choice.kind
+    assert name_form(result.recommended.model) == "linear"
+    assert result.recommended.validation_error < 0.04
 
 
 @pytest.mark.ci
