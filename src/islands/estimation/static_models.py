@@ -1,9 +1,11 @@
 """Static models: the output depends on the inputs of the same sample only.
 
-They are latent models of order 0, whose output is a weighted sum of inputs and one or two curves of them, and
-equations of the terms of a library that read no output. Curves have a scale of their own, equations products.
+They are latent models of order 0, whose output is a weighted sum of inputs and a few curves of them, and
+equations of the terms of a library that read no output, with logarithms and reciprocals. Curves have scales
+of their own, equations products.
 """
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -11,26 +13,32 @@ import numpy as np
 from islands.estimation.curve_models import add_curves
 from islands.estimation.estimate import estimate
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace
-from islands.estimation.forward_selection import make_selection_problem, select_forward
+from islands.estimation.forward_selection import find_simplest, make_selection_problem, select_forward
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front
 from islands.estimation.structure_selection.certificate import SubsetSearch
+from islands.estimation.structure_selection.deviations import find_offsets
 from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.expressions.primitives import MUL, PRIMITIVES
+from islands.expressions.tree import Apply, Constant, Expression, Lagged
 from islands.models.candidate_library import get_library
 from islands.models.latent import LatentModel, StateSpaceLayout
-from islands.models.narx import Model
+from islands.models.narx import Model, canonical_order
+from islands.models.regressor import regressor
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
 #: Curves, and terms of an equation, at most.
-_CURVES, _TERMS = 2, 10
+_CURVES, _TERMS = 3, 10
 
 #: Steps of the estimation of gains.
 _STEPS = 10
 
 #: Library of the terms.
 _LIBRARY = "magnitude"
+
+_ONE = Constant(1.0)
 
 
 # The fits of all libraries of a record share its static models.
@@ -82,12 +90,29 @@ def _begin(data: LatentData) -> Draft:
 
 
 def _fit_equations(record: Dataset) -> list[Model]:
-    """Return the equations of the terms that read inputs at lag 1 only."""
+    """Return the equations of terms that read inputs at lag 1 only."""
     library = screen_candidates(_LIBRARY, get_library(_LIBRARY).degree, 1, record)
-    pool = [item for item in library if all(channel for channel, _ in item.lags)]
-    problem = make_selection_problem(pool, record)
+    static = (item for item in library if all(channel for channel, _ in item.lags))
+    further = (item for each in _list_functions(record) if (item := regressor(each)[1]))
+    problem = make_selection_problem(canonical_order([*static, *further]), record)
     if isinstance(problem, EvaluationOutcome):
         return []
-    structures = SubsetSearch(problem, _TERMS).structures or select_forward(problem, _TERMS)
-    found = [estimate(structure, record) for structure in structures]
+    simplest = find_simplest(problem)
+    structures = {
+        tuple(canonical_order({simplest.get(item, item) for item in structure}))
+        for structure in SubsetSearch(problem, _TERMS).structures or select_forward(problem, _TERMS)
+    }
+    found = [estimate(structure, record) for structure in sorted(structures, key=len)]
     return [each.model for each in found if not isinstance(each, EvaluationOutcome)]
+
+
+def _list_functions(record: Dataset) -> Iterator[Expression]:
+    """Yield logarithms and reciprocals of inputs that do not reach zero, and products with them."""
+    offsets = find_offsets(record)[1:]
+    signals = [Lagged(channel, 1) for channel in range(1, record.inputs + 1)]
+    for signal in (each for each, offset in zip(signals, offsets, strict=True) if offset):
+        logarithm, inverse = Apply(PRIMITIVES["log"], (signal,)), Apply(PRIMITIVES["div"], (_ONE, signal))
+        yield from (logarithm, inverse)
+        yield from (Apply(MUL, (each, each)) for each in (logarithm, inverse))
+        yield from (Apply(MUL, (logarithm, other)) for other in signals)
+        yield from (Apply(MUL, (inverse, other)) for other in signals if other != signal)

@@ -48,10 +48,11 @@ def _measure_roughness(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
 
 
 def describe_static_curve(file: str, input_name: str, output_name: str) -> str:
-    """State that the points of a curve are no record of a dynamic system."""
+    """State that the points of a curve have no time, and how a static model of them is fitted."""
     return join_text(
         f"{file}: {output_name} is a static curve over {input_name}: the file has no time, and the order of "
-        "its rows plays no visible part. There are no dynamics to identify: fit a curve to the points. If "
-        "the rows follow each other in time, give the sampling time by ",
-        name_option("dt"),
+        "its rows plays no visible part. For a static model of the points, in which the sampling time plays "
+        "none either, write the rows in random order and give ",
+        name_option("dt", 1),
+        ". If the rows follow each other in time, give the sampling time by it",
     )
