@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite, isnan
 from typing import TypeAlias
 
+from islands.models.narx import Model
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.evidence import ErrorNoise, count_terms, is_linear, measure_lack
@@ -128,6 +129,12 @@ def recommend(
     selection.keep(DIVERGENCE, bounded)
     if hysteresis:
         selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
+    # A divergence that the record does not show needs a smaller error than that of every model without one.
+    is_bounded = [is_sound(assessments[at].physics, hysteresis) for at in selection.left]
+    first = is_bounded.index(True) if any(is_bounded) else len(is_bounded)
+    selection.keep(
+        CHECKS, [at for place, at in enumerate(selection.left) if is_bounded[place] or place < first]
+    )
     terms = count_terms([entry.model for entry in assessments])
     lack = _measure_lack(selection.left, sizes, assessments, terms)
     reference = min(selection.left, key=lambda at: (lack[at], at))
@@ -174,8 +181,17 @@ def _take_simplest(
     assessments: Sequence[Comparable],
     lack: Mapping[int, float],
 ) -> int:
-    """Return the linear one of models with as much evidence, or the smallest."""
-    return min(places, key=lambda at: (not is_linear(assessments[at].model), sizes[at], lack[at], at))
+    """Return the linear one of models with as much evidence, or the smallest.
+
+    Of linear models of one size, a state space is preferred: its noise is identified with it.
+    """
+
+    def rank(at: int) -> tuple[bool, float, bool, float, int]:
+        model = assessments[at].model
+        linear = is_linear(model)
+        return not linear, sizes[at], linear and isinstance(model, Model), lack[at], at
+
+    return min(places, key=rank)
 
 
 def _measure_lack(
