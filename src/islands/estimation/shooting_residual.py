@@ -1,10 +1,12 @@
 """Multiple-shooting residual of a model as a function of its parameters."""
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.damped_least_squares import Residual, approximate_jacobian
-from islands.kernels.simulate import DIVERGED, Layout, simulate
+from islands.kernels.simulate import DIVERGED, simulate
 from islands.models.coupled_narx import AnyModel
 from islands.models.narx import Model
 from islands.program.term_pool import link
@@ -36,16 +38,25 @@ class ShootingResidual(Residual):
     """
 
     def __init__(self, model: Model, record: Dataset, interval: int | None, warm_up: int | None) -> None:
-        first = model.maximum_lag if warm_up is None else warm_up
-        self._program = link(model.regressors)
-        self._cut: Layout = layout(record, first, interval)
-        self._y, self._bound = record.y, find_divergence_bound(record)
+        self._first = model.maximum_lag if warm_up is None else warm_up
+        self._interval, self._program = interval, link(model.regressors)
+        self._lay_out(record)
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True
-        self._sensitivities = make_sensitivities(model.regressors, record, first, interval)
+        self._sensitivities = make_sensitivities(model.regressors, record, self._first, interval)
         #: Number of samples of every interval, in the order of time.
         self.intervals = self._cut.length[np.argsort(self._cut.start)]
+
+    def _lay_out(self, record: Dataset) -> None:
+        self._record, self._cut = record, layout(record, self._first, self._interval)
+        self._y, self._bound = record.y, find_divergence_bound(record)
+
+    def with_record(self, record: Dataset) -> "ShootingResidual":
+        """Return the residual on the same record with other initial outputs."""
+        found = copy(self)
+        found._lay_out(record)
+        return found
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return prediction minus measurement over all predicted samples, or None after a divergence."""
@@ -68,7 +79,7 @@ class ShootingResidual(Residual):
         They are exact, but for central differences if a primitive of the user has no known derivative.
         """
         if self._sensitivities is not None:
-            return self._sensitivities(theta, directions)
+            return self._sensitivities.with_record(self._record)(theta, directions)
         return approximate_jacobian(
             lambda moved: [self(each) for each in moved], theta, int(self._predicted.sum()), directions
         )
@@ -140,7 +151,7 @@ class FreeRunResidual(Residual):
             record = change_initial_outputs(
                 self._record, changes.reshape(self._segments, self._depth), self._first
             )
-            self._started = changes, ShootingResidual(self._model, record, None, self._first)
+            self._started = changes, self._started[1].with_record(record)
         return self._started[1]
 
 

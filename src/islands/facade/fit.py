@@ -17,6 +17,7 @@ from islands.facade.fit_settings import FitSettings
 from islands.facade.front import StoppedFitError
 from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
+from islands.parallel import one_blas_thread
 from islands.progress import (
     ProgressCallback,
     Steps,
@@ -119,6 +120,7 @@ def fit(
     )
 
 
+@one_blas_thread
 def fit_record(
     record: AnyRecord,
     validation: AnyRecord | float = 0.25,

@@ -33,6 +33,7 @@ from islands.facade.refit import refit_models
 from islands.facade.results.identification import Result
 from islands.facade.trials.library import make_trial_library
 from islands.facade.trials.prepared_data import PreparedData, prepare_data, restore_data
+from islands.parallel import one_blas_thread
 from islands.progress import ProgressCallback, Steps, Stop, ignore_progress, never_stop
 from islands.records.coupled import AnyRecord, CoupledRecord, split_coupled, split_first
 from islands.records.dataset import Dataset
@@ -150,6 +151,7 @@ def identify(
     )
 
 
+@one_blas_thread
 def identify_record(
     record: AnyRecord,
     validation: AnyRecord | float = 0.25,

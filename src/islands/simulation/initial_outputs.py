@@ -6,7 +6,7 @@ integrator keeps it throughout the run, and a slow mode multiplies it. Of an int
 simulation with the true initial state has an error of 0.0005.
 
 The initial outputs are therefore estimated from the first part of every segment, where that noise matters.
-The same rule applies to all NARX models and to all uses of a free run: scores, bands, figures and
+The same rule applies to all models of one output and to all uses of a free run: scores, bands, figures and
 simulations.
 """
 
@@ -16,12 +16,16 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.kernels.state_space import simulate_state_space
 from islands.models.coupled_narx import AnyModel
+from islands.models.latent import LatentModel
 from islands.models.narx import Model
+from islands.models.protocol import DynamicModel
 from islands.records.coupled import AnyRecord
 from islands.records.dataset import Dataset, join
-from islands.records.signal_map import match_rate
+from islands.records.signal_map import map_signals, match_rate
 from islands.rounding import NORMAL_MEDIAN
+from islands.simulation.initial_states import estimate_first_states
 from islands.simulation.predictors import Simulation, free_run
 
 #: Samples of a segment from which its initial outputs are estimated: at least this number, and this part.
@@ -79,11 +83,12 @@ def estimate_initial_outputs(
     """Return the record with estimated outputs before the first prediction of every segment.
 
     The estimate is that of least squares on the first 100 samples of a segment, or on the first tenth of a
-    longer one, with the initial outputs as further measurements. The record itself is returned if the model
-    is not a NARX model of one output, if the noise of the initial outputs contributes at most ``least_share``
-    of the mean squared error, or if an estimate differs from the measurement by more than noise. The noise is
-    at most the error of the free run from the estimate, and at most what the third differences of the output
-    permit, so that the error of a model is not taken for noise.
+    longer one, with the initial outputs as further measurements. For a latent model, they are the outputs of
+    the states that this part shows. The record itself is returned if the model has several outputs, if the
+    noise of the initial outputs contributes at most ``least_share`` of the mean squared error, or if an
+    estimate differs from the measurement by more than noise. The noise is at most the error of the free run
+    from the estimate, and at most what the third differences of the output permit, so that the error of a
+    model is not taken for noise.
 
     Parameters
     ----------
@@ -105,16 +110,38 @@ def estimate_initial_outputs(
     ModelError, RecordError, SettingsError
         As for `free_run`.
     """
-    if not isinstance(model, Model) or not isinstance(record, Dataset):
+    if not isinstance(model, Model | LatentModel) or not isinstance(record, Dataset):
         return record
     first = model.maximum_lag if warm_up is None else warm_up
     # A warm-up that is too short, or a model without parameters, is an error of the free run.
     if model.theta is None or not isinstance(first, int) or first < model.maximum_lag:
         return record
+    if isinstance(model, LatentModel):
+        return _simulate_start(model, record, first)
     return _estimate(model, record, first, least_share)
 
 
 # Scores, bands and figures of one model on one record share the estimate.
+@lru_cache(maxsize=32)
+def _simulate_start(model: LatentModel, record: Dataset, first: int) -> Dataset:
+    """Return the record with the outputs of estimated states before the first predictions."""
+    at_rate = match_rate(model, record)
+    signals, offset = map_signals(model, at_rate)
+    y = np.array(at_rate.y)
+    for begin, end in at_rate.bounds:
+        last = min(end, begin + first + _window(end - begin))
+        if end - begin > first and not np.isnan(at_rate.y[begin + first : last]).all():
+            states, u = estimate_first_states(model, signals, begin, last)
+            late = last - begin - len(u)
+            run = np.empty(first - late)
+            simulate_state_space(model.theta, model.codes, u[: first - late], states.copy(), run)
+            y[begin + late : begin + first] = run + offset
+    started = replace(at_rate, y=y)
+    before, after = (_window_error(model, begun, at_rate, first) for begun in (at_rate, started))
+    return started if after < before else record
+
+
+# As above.
 @lru_cache(maxsize=32)
 def _estimate(model: Model, record: Dataset, first: int, least_share: float) -> Dataset:
     depth = model.output_lag
@@ -247,7 +274,7 @@ def _window(samples: int) -> int:
     return max(_LEAST_SAMPLES, round(_PART * samples))
 
 
-def _window_error(model: Model, started: Dataset, record: Dataset, first: int) -> float:
+def _window_error(model: DynamicModel, started: Dataset, record: Dataset, first: int) -> float:
     """Return the sum of squares of a free run over the samples of the estimate."""
     run = free_run(model, started, first)
     if not run.outcome:

@@ -1,6 +1,7 @@
 """Derivatives of predictions with respect to the parameters of a model."""
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,12 +48,21 @@ class Sensitivities:
             np.array([derivative.lag for _, derivative in products], np.int64), return_counts=True
         )
         self._lags, self._ends = lags, np.cumsum(counts, dtype=np.int64)
-        self._cut = layout(record, warm_up, interval, WIDTHS)
+        self._limits = warm_up, interval
+        self._record, self._cut = record, layout(record, warm_up, interval, WIDTHS)
         starts = np.argsort(self._cut.start)
         ends = np.cumsum(self._cut.length[starts])
         self._place = np.empty_like(ends)
         self._place[starts] = ends - self._cut.length[starts]
         self._predictions = int(ends[-1])
+
+    def with_record(self, record: Dataset) -> "Sensitivities":
+        """Return the derivatives on the same record with other initial outputs."""
+        if record is self._record:
+            return self
+        found = copy(self)
+        found._record, found._cut = record, layout(record, *self._limits, WIDTHS)
+        return found
 
     def __call__(self, theta: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivatives of all predictions along directions.

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite, isnan
 from typing import TypeAlias
 
+from islands.models.narx import Model
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.evidence import ErrorNoise, count_terms, is_linear, is_static, measure_lack
@@ -104,7 +105,8 @@ def recommend(
     Candidates are the models whose free run on the validation data is bounded and, if the search constrains
     models of hysteresis, of them those that have Property 1. The one with the most evidence is the reference.
     Of the models with as much evidence, those that diverge in holds or excursions are excluded, and the first
-    linear one of the rest is recommended, or the smallest one. A criterion that no model meets excludes none.
+    linear one of the rest is recommended, or a static one, or the smallest. A criterion that no model meets
+    excludes none.
 
     Parameters
     ----------
@@ -128,6 +130,12 @@ def recommend(
     selection.keep(DIVERGENCE, bounded)
     if hysteresis:
         selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
+    # A divergence that the record does not show needs a smaller error than that of every model without one.
+    is_bounded = [is_sound(assessments[at].physics, hysteresis) for at in selection.left]
+    first = is_bounded.index(True) if any(is_bounded) else len(is_bounded)
+    selection.keep(
+        CHECKS, [at for place, at in enumerate(selection.left) if is_bounded[place] or place < first]
+    )
     terms = count_terms([entry.model for entry in assessments])
     lack = _measure_lack(selection.left, sizes, assessments, terms)
     reference = min(selection.left, key=lambda at: (lack[at], at))
@@ -178,11 +186,15 @@ def _take_simplest(
     assessments: Sequence[Comparable],
     lack: Mapping[int, float],
 ) -> int:
-    """Return the linear one of models with as much evidence, or a static one, or the smallest."""
+    """Return the linear one of models with as much evidence, or a static one, or the smallest.
 
-    def rank(at: int) -> tuple[bool, bool, float, float, int]:
+    Of linear models of one size, a state space is preferred: its noise is identified with it.
+    """
+
+    def rank(at: int) -> tuple[bool, bool, float, bool, float, int]:
         model = assessments[at].model
-        return not is_linear(model), not is_static(model), sizes[at], lack[at], at
+        linear, static = is_linear(model), is_static(model)
+        return not linear, not static, sizes[at], linear and isinstance(model, Model), lack[at], at
 
     return min(places, key=rank)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from islands.expressions.parsing import parse
+from islands.models.latent import LatentModel
 from islands.models.narx import make_model
 from islands.simulation.initial_outputs import estimate_initial_outputs, simulate_freely
 from islands.simulation.predictors import free_run
@@ -67,3 +68,21 @@ def test_diverging_free_run_starts_from_the_measured_outputs():
     model = law(**{"y(k-1)": 1.2, "u(k-1)": 0.02})
     assert estimate_initial_outputs(model, record) is record
     assert not simulate_freely(model, record).outcome
+
+
+def test_the_states_of_a_latent_model_are_estimated_from_as_many_samples():
+    parameters = {"a1_1": 1.0, "b1": 0.02, "c1": 1.0}
+    model = LatentModel(
+        parameters=tuple(parameters.values()),
+        wiring=tuple(parameters),
+        input_names=("q",),
+        output_name="h",
+        order=1,
+        units=(),
+        memory=4,
+        operating_inputs=(0.0,),
+    )
+    records = [make_tank(seed, 400) for seed in range(20)]
+    runs = [(free_run(model, record), simulate_freely(model, record)) for record in records]
+    assert max(rmse(measured) for measured, _ in runs) > 1.3 * TANK_NOISE
+    assert max(rmse(estimated) for _, estimated in runs) < 1.15 * TANK_NOISE

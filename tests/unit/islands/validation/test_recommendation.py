@@ -154,6 +154,12 @@ def test_a_check_that_the_data_contradict_excludes_no_model():
     assert found.excluded == (Exclusion("evidence", (1, 3)),)
 
 
+def test_a_divergence_needs_a_smaller_validation_error_than_that_of_every_sound_model():
+    sound = Candidate(9, 0.98 * NOISE, estimated=0.013)
+    assert chosen(sound, Candidate(5, NOISE, bounded=False)) == 9
+    assert chosen(replace(sound, blocks=1.02 * NOISE), Candidate(5, NOISE, bounded=False)) == 5
+
+
 def test_every_model_is_left_or_excluded_once_and_the_smallest_left_is_recommended():
     generator = np.random.default_rng(8)
     for _ in range(200):
