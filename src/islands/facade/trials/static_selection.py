@@ -1,6 +1,6 @@
 """Choice of a static record: the output depends on the inputs of the same sample only."""
 
-from math import exp
+from math import log
 
 import numpy as np
 
@@ -12,9 +12,8 @@ from islands.facade.trials.rate_selection import compute_errors
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.split import Split
-from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import is_static
+from islands.validation.evidence import ErrorNoise, is_static
 from islands.validation.recommendation import DECISIVE
 from islands.validation.simple_models import assess_curve_models, assess_linear_model, assess_static_models
 
@@ -54,13 +53,15 @@ def find_static(split: Split, library: TrialLibrary, steps: Steps) -> tuple[int,
         [*models, *assess_curve_models(split, 1, warm_up, "none", steps)]
     ):
         return ()
+    own = take_recommended(models).errors[-split.validation.samples :]
     try:
-        other = float(np.nanmean(compute_errors(split, library, 1) ** 2))
+        other = compute_errors(split, library, 1) / split.estimation.output_range
     except RecordError:
         return ()  # too short for the library: the search reports it
-    least = max(other, (RESOLUTION * split.estimation.output_range) ** 2)
-    square = take_recommended(models).validation_error ** 2
-    return late if square <= exp(DECISIVE / split.validation.samples) * least else ()
+    closest = min(own, other, key=lambda each: float(np.nanmean(each**2)))
+    noise = ErrorNoise.fit(closest, split.validation.segments)
+    gain = log(noise.measure(own)) - log(noise.measure(other))
+    return late if noise.samples * gain <= DECISIVE else ()
 
 
 def _is_static(models: list[Assessment]) -> bool:
