@@ -29,8 +29,8 @@ from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.simulation.outcome import EvaluationOutcome
 
-#: Curves, and terms of an equation, at most.
-_CURVES, _TERMS = 3, 10
+#: Curves of a model, or terms of an equation, at most.
+_TERMS = 10
 
 #: Steps of the estimation of gains.
 _STEPS = 10
@@ -76,8 +76,11 @@ def identify_static_models(record: Dataset, steps: Steps) -> list[LatentModel | 
         data = make_latent_data(record)
         found = [_begin(data).estimate(data)]
         systems = [each for each in found if isinstance(each, FittedStateSpace)]
-        for _ in range(_CURVES):
-            systems += add_curves(find_front(systems)[-1:], data, steps=steps)
+        for curves in range(_TERMS):
+            best = find_front(systems)[-1:]
+            if any(len(each.units) < curves for each in best):
+                break  # The last curve gained nothing.
+            systems += add_curves(best, data, steps=steps)
         shared += [*estimate_models(find_front(systems), record, steps), *_fit_equations(record)]
     return shared
 
