@@ -33,6 +33,7 @@ from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.evidence import is_linear, measure_size
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import Recommendation, is_sound, recommend, recommend_fittest
+from islands.validation.recommendation_reasons import state_fit, state_reasons
 from islands.validation.simple_models import assess_curve_models, assess_linear_model
 
 #: Result of the same search.
@@ -164,13 +165,15 @@ class SearchResult:
     @property
     def recommendation(self) -> Recommendation:
         """Rank of the recommended model, and the reasons."""
-        unit = self.record.output_unit
+        hysteresis, unit = self.requires_property_1, self.record.output_unit
         if self.settings.get("select") == "fitness":  # a setting of evolution only
             mode = FITNESS_MODES[self.settings["fitness"]]
-            return recommend_fittest(self.models, mode, self.requires_property_1, unit)
+            found = recommend_fittest(self.models, mode)
+            return replace(found, reasons=state_fit(self.models[found.rank - 1], mode, hysteresis, unit))
         sizes = [measure_size(entry.model) for entry in self.models]
         accurate = self.settings.get("prefer") == ACCURATE
-        return recommend(sizes, self.models, self.requires_property_1, unit, accurate)
+        found = recommend(sizes, self.models, hysteresis, accurate)
+        return replace(found, reasons=state_reasons(found, sizes, self.models, hysteresis, unit, accurate))
 
     @property
     def recommended(self) -> Assessment:
