@@ -32,7 +32,13 @@ from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.evidence import is_linear, measure_size
 from islands.validation.prediction_bands import calibrate_bands
-from islands.validation.recommendation import Recommendation, is_sound, recommend, recommend_fittest
+from islands.validation.recommendation import (
+    Recommendation,
+    is_sound,
+    measure_squares,
+    recommend,
+    recommend_fittest,
+)
 from islands.validation.recommendation_reasons import state_fit, state_reasons
 from islands.validation.simple_models import assess_curve_models, assess_linear_model
 
@@ -430,11 +436,13 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     """Return the models with the most evidence of every class and size, best first; see `rank_models`.
 
-    Of one size, the least error of the free run on all data is the most evidence. If the best model fails the
-    physics checks, the best one of those that pass them is kept as well, as in a recommendation.
+    Of one size, the least whitened error of the free run on all data is the most evidence. If the best model
+    fails the physics checks, the best one of those that pass them is kept as well, as in a recommendation.
     """
+    ranked = rank_models(models)
+    squares, _ = measure_squares(ranked) if ranked else ([], 0)
     groups: dict[tuple[str, bool, int], list[Assessment]] = {}
-    for entry in sorted(rank_models(models), key=lambda each: each.mean_square):
+    for _, entry in sorted(zip(squares, ranked, strict=True), key=lambda pair: pair[0]):
         kind = entry.model.kind, is_linear(entry.model) and isinstance(entry.model, LatentModel)
         groups.setdefault((*kind, entry.model.free_size), []).append(entry)
     kept = []

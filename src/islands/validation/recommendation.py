@@ -13,6 +13,7 @@ The setting ``select`` can replace this rule by the paper's choice of Appendix A
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, isfinite, isnan
 from typing import TypeAlias
 
@@ -159,6 +160,26 @@ def recommend_joint(assessments: Sequence[CoupledAssessment], terms: int) -> Cou
     return assessments[_take_simplest(equal, sizes, assessments, lack)]
 
 
+def measure_squares(assessments: Sequence[Comparable]) -> tuple[list[float], int]:
+    """Return the mean squares of the whitened errors of models, and the number of errors.
+
+    The noise is that of the closest of them; see `ErrorNoise`.
+    """
+    noise = _fit_noise(min(assessments, key=lambda entry: entry.mean_square))
+    return [_measure_square(noise, entry) for entry in assessments], noise.samples
+
+
+# A front is compared again whenever a model is added to it.
+@lru_cache(maxsize=8)
+def _fit_noise(closest: Comparable) -> ErrorNoise:
+    return ErrorNoise.fit(closest.errors, closest.split.segments)
+
+
+@lru_cache(maxsize=256)
+def _measure_square(noise: ErrorNoise, entry: Comparable) -> float:
+    return noise.measure(entry.errors)
+
+
 def _take_simplest(
     places: Sequence[int],
     sizes: Sequence[float],
@@ -183,15 +204,9 @@ def _measure_lack(
 ) -> dict[int, float]:
     """Return the information criteria of some models, which have a bounded free run."""
     compared = [assessments[at] for at in places]
-    closest = min(compared, key=lambda entry: entry.mean_square)
-    noise = ErrorNoise.fit(closest.errors, closest.split.segments)
-    lack = measure_lack(
-        [entry.model for entry in compared],
-        [sizes[at] for at in places],
-        [noise.measure(entry.errors) for entry in compared],
-        noise.samples,
-        terms,
-    )
+    squares, samples = measure_squares(compared)
+    models, own = [entry.model for entry in compared], [sizes[at] for at in places]
+    lack = measure_lack(models, own, squares, samples, terms)
     return dict(zip(places, lack.tolist(), strict=True))
 
 
