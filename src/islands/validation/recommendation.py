@@ -188,13 +188,14 @@ def _take_simplest(
 ) -> int:
     """Return the linear one of models with as much evidence, or the smallest.
 
-    Of linear models of one size, a state space is preferred: its noise is identified with it.
+    Of linear models, a state space is preferred: its order and its dead times are identified together with
+    the noise, and from all samples, also those that a lag of an equation leaves out.
     """
 
-    def rank(at: int) -> tuple[bool, float, bool, float, int]:
+    def rank(at: int) -> tuple[bool, bool, float, float, int]:
         model = assessments[at].model
         linear = is_linear(model)
-        return not linear, sizes[at], linear and isinstance(model, Model), lack[at], at
+        return not linear, linear and isinstance(model, Model), sizes[at], lack[at], at
 
     return min(places, key=rank)
 
