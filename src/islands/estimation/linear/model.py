@@ -307,7 +307,8 @@ def _unpack(values: Signal, fit: Fit) -> tuple[Structure, list[Signal]] | None:
         fractions[output, early] = values[at : at + early.size]
         at += early.size
     moved = replace(structure, sections=move(structure.sections, values[at:]), fractions=fractions)
-    mappings = [map_parameters(moved, output, fit.signals.samples) for output in range(len(own))]
+    samples = fit.signals.samples
+    mappings = [map_parameters(structure, output, samples, moved) for output in range(len(own))]
     coefficients = []
     for output, (mapping, parameters) in enumerate(zip(mappings, own, strict=True)):
         if mapping is None:

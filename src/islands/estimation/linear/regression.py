@@ -327,16 +327,26 @@ def project(signals: Signals, structure: Structure) -> Fit | None:
     return Fit(signals, structure, tuple(parameters), tuple(coefficients), tuple(states), squares, counts)
 
 
-def map_parameters(structure: Structure, output: int, samples: int) -> Signal | None:
+def map_parameters(
+    structure: Structure, output: int, samples: int, moved: Structure | None = None
+) -> Signal | None:
     """Return what tied states and coefficients of an output are for its linear parameters.
+
+    Parameters
+    ----------
+    structure : Structure
+        Numerators in continuous time have the unit of its poles.
+    output, samples : int
+    moved : Structure, optional
+        One near it, whose mapping of the same parameters is returned; by default the structure itself.
 
     Returns
     -------
     ndarray, shape (recordings * tied + coefficients, parameters), optional
         None if numerators need the continuous time of a pole that has none.
     """
-    mapping = _map_points(structure, output, samples, [structure])
-    return None if mapping is None else mapping[0]
+    mapping = _map_points(structure, output, samples, [structure, *([moved] if moved else [])])
+    return None if mapping is None else mapping[-1]
 
 
 def _map_points(
