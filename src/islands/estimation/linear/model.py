@@ -176,14 +176,16 @@ def make_model(
 ) -> LinearModel:
     """Return the model of a fit in the units of the record, with standard errors.
 
-    Rivals are fits of other structures. Those with the same modes add to the standard errors by the weight
-    that the deviance on another record gives them (Buckland, Burnham & Augustin 1997): a structure of fewer
-    parameters may have a bias that the criterion of Schwarz does not detect.
+    Rivals are fits after a change of the structure. Those with the same modes add to the standard errors by
+    the weight that the deviance on another record gives them against the best fit (Buckland, Burnham &
+    Augustin 1997): a structure of fewer parameters may have a bias that the criterion of Schwarz does not
+    detect. Changes do not exclude each other, so that every one adds its part.
     """
     structure, outputs = fit.structure, len(fit.coefficients)
     best, theta = _estimate(signals, fit, scales), _pack(fit)
     others = [_estimate(signals, each, scales) for each in rivals]
-    weights = [np.exp(0.5 * (fit.expected_deviance - each.expected_deviance)) for each in rivals]
+    gains = np.array([fit.expected_deviance - each.expected_deviance for each in rivals])
+    weights = (0.5 + 0.5 * np.tanh(0.25 * gains)).tolist()
     parts = [
         _realise(fit.coefficients[output], structure, output, scales, signals.samples)
         for output in range(outputs)
@@ -251,16 +253,16 @@ def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _MeasuredQuantities
 def _average(
     best: _MeasuredQuantities, others: Sequence[_MeasuredQuantities], weights: Sequence[float]
 ) -> tuple[tuple[float, ...], ...]:
-    """Return the standard errors of the best estimate over the structures that may be the true one."""
+    """Return the standard errors of the best estimate, where every change is in the law or not."""
     variances: list[Signal] = [np.square(each) for each in best.errors]
-    total = 1.0
+    errors: list[Signal] = [np.array(each) for each in variances]
     for other, weight in zip(others, weights, strict=True):
         if other.kinds == best.kinds and np.isfinite(np.concatenate(other.errors)).all():
-            total += weight
             for output, (one, two) in enumerate(zip(best.quantities, other.quantities, strict=True)):
                 moved = [x.value - y.value for x, y in zip(one, two, strict=True)]
-                variances[output] += weight * (np.square(other.errors[output]) + np.square(moved))
-    return tuple(tuple(np.sqrt(each / total).tolist()) for each in variances)
+                square = np.square(other.errors[output]) + np.square(moved)
+                variances[output] += weight * np.maximum(square - errors[output], 0.0)
+    return tuple(tuple(np.sqrt(each).tolist()) for each in variances)
 
 
 def estimate_covariance(signals: Signals, fit: Fit) -> Signal:
