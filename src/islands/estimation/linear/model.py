@@ -7,7 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.estimation.linear.regression import Fit, Structure, linearise, map_parameters, move
+from islands.estimation.linear.regression import (
+    Fit,
+    Structure,
+    linearise,
+    map_parameters,
+    move,
+    project,
+    restrict,
+)
 from islands.estimation.linear.sections import Section, Signal, Signals, find_poles
 from islands.kernels.state_space import simulate_state_space
 from islands.models.state_space import INTEGRATOR_GAINS, Quantity, StateSpace, measure_mode
@@ -182,8 +190,8 @@ def make_model(
     detect. Changes do not exclude each other, so that every one adds its part.
     """
     structure, outputs = fit.structure, len(fit.coefficients)
-    best, theta = _estimate(signals, fit, scales), _pack(fit)
-    others = [_estimate(signals, each, scales) for each in rivals]
+    noise, theta = restrict(signals, fit).structure.noise, _pack(fit)
+    best, *others = [_estimate(signals, each, scales, noise) for each in (fit, *rivals)]
     gains = np.array([fit.expected_deviance - each.expected_deviance for each in rivals])
     weights = (0.5 + 0.5 * np.tanh(0.25 * gains)).tolist()
     parts = [
@@ -235,19 +243,21 @@ class _MeasuredQuantities(NamedTuple):
         return [(each.name, each.input) for own in self.quantities for each in own]
 
 
-def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _MeasuredQuantities:
-    covariance, outputs = estimate_covariance(signals, fit), range(len(fit.coefficients))
+def _estimate(signals: Signals, fit: Fit, scales: Scales, noise: tuple[Signal, ...]) -> _MeasuredQuantities:
+    """Return the quantities of a fit, with the covariance that another noise gives them."""
+    weighed = project(signals, replace(fit.structure, noise=noise)) or fit
+    covariance, outputs = estimate_covariance(signals, weighed), range(len(fit.coefficients))
 
-    def measure(values: Signal) -> list[list[Quantity]]:
-        found = _unpack(values, fit)
+    def measure(values: Signal, near: Fit = weighed) -> list[list[Quantity]]:
+        found = _unpack(values, near)
         if found is None:
             return [[] for _ in outputs]
         moved, coefficients = found
         return [list(_measure(moved, coefficients[output], output, scales)) for output in outputs]
 
-    theta = _pack(fit)
-    quantities = tuple(map(tuple, measure(theta)))
-    return _MeasuredQuantities(quantities, _propagate(measure, quantities, theta, covariance), covariance)
+    quantities = tuple(map(tuple, measure(_pack(fit), fit)))
+    errors = _propagate(measure, quantities, _pack(weighed), covariance)
+    return _MeasuredQuantities(quantities, errors, covariance)
 
 
 def _average(

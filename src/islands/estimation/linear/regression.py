@@ -36,6 +36,9 @@ _NEGLIGIBLE = 1e-3
 #: Halvings of a step.
 _MAX_HALVINGS = 8
 
+#: Part of a standard error by which the noise is moved for the derivatives of the restricted likelihood.
+_NOISE_STEP = 0.1
+
 #: Part by which poles and dead times are moved for the derivatives of numerators.
 _MOVED = 1e-5
 
@@ -674,6 +677,58 @@ def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: 
         if gain < least:
             break
     return fit
+
+
+def restrict(signals: Signals, fit: Fit) -> Fit:
+    """Return a fit with noise of the largest restricted likelihood, by a step.
+
+    The parameters of the system absorb a part of the noise at the frequencies that determine them, so that
+    its spectrum is too small there. The restricted likelihood has the determinant of their information
+    (Patterson & Thompson 1971); its derivatives by the noise lead from the largest likelihood to its own.
+    """
+    factors, noise = linearise(signals, fit), list(fit.structure.noise)
+    for output, each in enumerate(factors or []):
+        if noise[output].size:
+            noise[output] = _restrict_output(signals, fit, output, each)
+    return project(signals, replace(fit.structure, noise=tuple(noise))) or fit
+
+
+def _restrict_output(signals: Signals, fit: Fit, output: int, each: OutputFactor) -> Signal:
+    """Return the noise of one output after the step."""
+    noise = fit.structure.noise[output]
+    cost, triangle = _split_noise(each, fit, output)
+    back = np.asarray(np.linalg.pinv(triangle, rcond=1e-6), np.float64)
+
+    def shift(step: Signal) -> Fit | None:
+        moved = list(fit.structure.noise)
+        moved[output] = noise + (back @ step).reshape(noise.shape)
+        return project(signals, replace(fit.structure, noise=tuple(moved)))
+
+    slopes = np.zeros(noise.size)
+    for place in range(noise.size):
+        found = shift(_NOISE_STEP * np.eye(noise.size)[place])
+        factors = linearise(signals, found) if found else None
+        if found and factors:
+            slopes[place] = (_split_noise(factors[output], found, output)[0] - cost) / _NOISE_STEP
+    steps = (shift(-(0.5**halving) * slopes) for halving in range(_MAX_HALVINGS))
+    found = next(filter(None, steps), fit)
+    return found.structure.noise[output]
+
+
+def _split_noise(each: OutputFactor, fit: Fit, output: int) -> tuple[float, Signal]:
+    """Return the logarithm of the determinant of all parameters but the noise, and the factor of the noise.
+
+    The squares of changes of the noise by the factor are those that the deviance grows by, times 2.
+    """
+    count, size = fit.parameters[output].size, fit.structure.noise[output].size
+    places = np.arange(each.factor.shape[1] - 1)
+    is_noise = (places >= count) & (places < count + size)
+    columns = each.factor[:, np.append(places[~is_noise], places[is_noise])]
+    triangle = np.asarray(np.linalg.qr(columns, mode="r"))
+    diagonal = np.abs(np.diag(triangle))[: places.size - size]
+    unit = np.sqrt(2.0 * fit.counts[output] / max(fit.squares[output], np.finfo(float).tiny))
+    determined = diagonal > _DEPENDENT * np.abs(columns).max(initial=0.0)
+    return 2.0 * float(np.log(diagonal[determined]).sum()), unit * triangle[-size:, -size:]
 
 
 def predict(signals: Signals, fit: Fit) -> float:
