@@ -267,11 +267,12 @@ def _average(
     variances: list[Signal] = [np.square(each) for each in best.errors]
     errors: list[Signal] = [np.array(each) for each in variances]
     for other, weight in zip(others, weights, strict=True):
-        if other.kinds == best.kinds and np.isfinite(np.concatenate(other.errors)).all():
+        if other.kinds == best.kinds:
             for output, (one, two) in enumerate(zip(best.quantities, other.quantities, strict=True)):
                 moved = [x.value - y.value for x, y in zip(one, two, strict=True)]
                 square = np.square(other.errors[output]) + np.square(moved)
-                variances[output] += weight * np.maximum(square - errors[output], 0.0)
+                # A dead time may have no value where the response to an input begins.
+                variances[output] += weight * np.fmax(square - errors[output], 0.0)
     return tuple(tuple(np.sqrt(each).tolist()) for each in variances)
 
 

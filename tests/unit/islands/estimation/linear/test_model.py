@@ -29,3 +29,21 @@ def test_gain_has_the_standard_error_of_the_levels_that_it_joins(excess):
     model = make_model(signals, minimise(signals, start, 20), scales)
     place = [each.name for each in model.quantities[0]].index("static gain")
     assert model.errors[0][place] == pytest.approx(0.05 / np.sqrt(samples), rel=0.1)
+
+
+def test_changes_of_dead_times_add_up_in_the_standard_errors():
+    random = np.random.default_rng(2)
+    u = np.repeat(random.normal(size=(40, 2)), 10, axis=0)
+    y = lfilter([0.0, 0.1], [1.0, -0.9], u.sum(axis=1)) + random.normal(0.0, 0.1, 400)
+    signals, scales = scale_signals(u, y, 1.0)
+    delays = np.zeros((1, 2), np.int64)
+    whole = make_structure((np.array([-0.9]),), 0, delays, delays > 0, (WHITE,), signals.first)
+    changes = (np.array([[True, False]]), np.array([[False, True]]))
+    structures = [whole, *(replace(whole, leads=leads, delays=delays + leads) for leads in changes)]
+    fit, *rivals = [minimise(signals, project(signals, each), 20) for each in structures]
+    alone, *single, both = [
+        np.square(make_model(signals, fit, scales, (), few).errors[0])
+        for few in ((), rivals[:1], rivals[1:], rivals)
+    ]
+    assert (single[0] > alone).any()
+    np.testing.assert_allclose(both - alone, single[0] + single[1] - 2.0 * alone, atol=1e-12)
