@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.expressions.parsing import parse
+from islands.models.latent import LatentModel
 from islands.models.narx import Model, make_model
 from islands.models.protocol import DynamicModel
 from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
+from islands.validation.evidence import is_linear
 
 #: Sampling time of all records in seconds.
 DT = 0.05
@@ -70,8 +72,11 @@ class Law:
         """Return whether a model has exactly the terms of the law.
 
         A regressor equals a term if both are proportional on the record: with positive inputs ``sqrt(u^2)``
-        is ``u``.
+        is ``u``. A linear state space has those of a linear law of its order and dead times.
         """
+        if isinstance(model, LatentModel) and is_linear(model) and is_linear(self.model):
+            lags = [lag for item in self.model.regressors for channel, lag in item.lags if channel]
+            return model.order == self.model.output_lag and min(model.input_lags) + 1 == min(lags)
         if not self.in_vocabulary or not isinstance(model, Model) or model.size != len(self.terms):
             return False
         warm_up = max(model.maximum_lag, self.model.maximum_lag)

@@ -32,7 +32,14 @@ from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
 from islands.validation.evidence import is_linear, is_static, measure_size
 from islands.validation.prediction_bands import calibrate_bands
-from islands.validation.recommendation import Recommendation, is_sound, recommend, recommend_fittest
+from islands.validation.recommendation import (
+    Recommendation,
+    is_sound,
+    measure_squares,
+    recommend,
+    recommend_fittest,
+)
+from islands.validation.recommendation_reasons import state_fit, state_reasons
 from islands.validation.simple_models import assess_curve_models, assess_linear_model
 
 #: Result of the same search.
@@ -164,13 +171,15 @@ class SearchResult:
     @property
     def recommendation(self) -> Recommendation:
         """Rank of the recommended model, and the reasons."""
-        unit = self.record.output_unit
+        hysteresis, unit = self.requires_property_1, self.record.output_unit
         if self.settings.get("select") == "fitness":  # a setting of evolution only
             mode = FITNESS_MODES[self.settings["fitness"]]
-            return recommend_fittest(self.models, mode, self.requires_property_1, unit)
+            found = recommend_fittest(self.models, mode)
+            return replace(found, reasons=state_fit(self.models[found.rank - 1], mode, hysteresis, unit))
         sizes = [measure_size(entry.model) for entry in self.models]
         accurate = self.settings.get("prefer") == ACCURATE
-        return recommend(sizes, self.models, self.requires_property_1, unit, accurate)
+        found = recommend(sizes, self.models, hysteresis, accurate)
+        return replace(found, reasons=state_reasons(found, sizes, self.models, hysteresis, unit, accurate))
 
     @property
     def recommended(self) -> Assessment:
@@ -433,11 +442,13 @@ def take_recommended(models: Sequence[Assessment]) -> Assessment:
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
     """Return the models with the most evidence of every class and size, best first; see `rank_models`.
 
-    Of one size, the least error of the free run on all data is the most evidence. If the best model fails the
-    physics checks, the best one of those that pass them is kept as well, as in a recommendation.
+    Of one size, the least whitened error of the free run on all data is the most evidence. If the best model
+    fails the physics checks, the best one of those that pass them is kept as well, as in a recommendation.
     """
+    ranked = rank_models(models)
+    squares, _ = measure_squares(ranked) if ranked else ([], 0)
     groups: dict[tuple[str, bool, bool, int], list[Assessment]] = {}
-    for entry in sorted(rank_models(models), key=lambda each: each.mean_square):
+    for _, entry in sorted(zip(squares, ranked, strict=True), key=lambda pair: pair[0]):
         model = entry.model
         kind = model.kind, is_linear(model) and isinstance(model, LatentModel), is_static(model)
         groups.setdefault((*kind, entry.model.free_size), []).append(entry)

@@ -12,7 +12,8 @@ The setting ``select`` can replace this rule by the paper's choice of Appendix A
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, isfinite, isnan
 from typing import TypeAlias
 
@@ -20,16 +21,10 @@ from islands.models.narx import Model
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.evidence import ErrorNoise, count_terms, is_linear, is_static, measure_lack
-from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
+from islands.validation.physics import PhysicsChecks
 
 #: Difference of the evidence of two models that do not count as equal.
 DECISIVE = 10.0
-
-#: Distance of the output at held inputs from its recorded range, in ranges, that is not stated.
-_NEAR = 1.0
-
-#: Drift of the output at the end of such a hold, in ranges, that is not stated.
-_STILL = 0.01
 
 #: Reasons to exclude models, in the order of the criteria.
 DIVERGENCE = "validation-divergence"
@@ -65,7 +60,7 @@ class Recommendation:
     rank : int
         Rank of the model; 1 has the least validation error.
     reasons : tuple of str
-        Reasons for the choice, each a statement about measured quantities.
+        Reasons for the choice, each a statement about measured quantities; see `state_reasons`.
     reference : int or None
         Rank of the model that the others are compared with. None if models are not compared.
     excluded : tuple of Exclusion
@@ -73,7 +68,7 @@ class Recommendation:
     """
 
     rank: int
-    reasons: tuple[str, ...]
+    reasons: tuple[str, ...] = ()
     reference: int | None = None
     excluded: tuple[Exclusion, ...] = ()
 
@@ -97,7 +92,6 @@ def recommend(
     sizes: Sequence[float],
     assessments: Sequence[Assessment],
     hysteresis: bool,
-    unit: str = "",
     accurate: bool = False,
 ) -> Recommendation:
     """Choose the simplest of the models with the most evidence.
@@ -116,16 +110,12 @@ def recommend(
         Assessments on the same estimation data and validation data, best first.
     hysteresis : bool
         Whether models need Property 1.
-    unit : str
-        Unit of the output, for the reasons.
     accurate : bool
         Whether the model with the most evidence is recommended, of those that are left.
     """
     bounded = [at for at, entry in enumerate(assessments) if entry.outcomes["validation"]["free_run"]]
     if not bounded:
-        return Recommendation(
-            1, ("the free run of every model diverges; this one has the least one-step-ahead error",)
-        )
+        return Recommendation(1)
     selection = _Selection(len(assessments))
     selection.keep(DIVERGENCE, bounded)
     if hysteresis:
@@ -147,16 +137,7 @@ def recommend(
         if accurate
         else _take_simplest(selection.left, sizes, assessments, lack)
     )
-    found = Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
-    model = assessments[chosen].model
-    reasons = (
-        f"static: {model.output_name} depends on the inputs of the same sample only"
-        if is_static(model)
-        else "",
-        _describe_choice(found, sizes, assessments, unit, accurate),
-        _describe_physics(found, assessments, hysteresis, unit),
-    )
-    return replace(found, reasons=tuple(filter(None, reasons)))
+    return Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
 
 
 def recommend_joint(assessments: Sequence[CoupledAssessment], terms: int) -> CoupledAssessment:
@@ -180,6 +161,26 @@ def recommend_joint(assessments: Sequence[CoupledAssessment], terms: int) -> Cou
     return assessments[_take_simplest(equal, sizes, assessments, lack)]
 
 
+def measure_squares(assessments: Sequence[Comparable]) -> tuple[list[float], int]:
+    """Return the mean squares of the whitened errors of models, and the number of errors.
+
+    The noise is that of the closest of them; see `ErrorNoise`.
+    """
+    noise = _fit_noise(min(assessments, key=lambda entry: entry.mean_square))
+    return [_measure_square(noise, entry) for entry in assessments], noise.samples
+
+
+# A front is compared again whenever a model is added to it.
+@lru_cache(maxsize=8)
+def _fit_noise(closest: Comparable) -> ErrorNoise:
+    return ErrorNoise.fit(closest.errors, closest.split.segments)
+
+
+@lru_cache(maxsize=256)
+def _measure_square(noise: ErrorNoise, entry: Comparable) -> float:
+    return noise.measure(entry.errors)
+
+
 def _take_simplest(
     places: Sequence[int],
     sizes: Sequence[float],
@@ -188,13 +189,14 @@ def _take_simplest(
 ) -> int:
     """Return the linear one of models with as much evidence, or a static one, or the smallest.
 
-    Of linear models of one size, a state space is preferred: its noise is identified with it.
+    Of linear models, a state space is preferred: its order and its dead times are identified together with
+    the noise, and from all samples, also those that a lag of an equation leaves out.
     """
 
-    def rank(at: int) -> tuple[bool, bool, float, bool, float, int]:
+    def rank(at: int) -> tuple[bool, bool, bool, float, float, int]:
         model = assessments[at].model
         linear, static = is_linear(model), is_static(model)
-        return not linear, not static, sizes[at], linear and isinstance(model, Model), lack[at], at
+        return not linear, not static, linear and isinstance(model, Model), sizes[at], lack[at], at
 
     return min(places, key=rank)
 
@@ -204,21 +206,13 @@ def _measure_lack(
 ) -> dict[int, float]:
     """Return the information criteria of some models, which have a bounded free run."""
     compared = [assessments[at] for at in places]
-    closest = min(compared, key=lambda entry: entry.mean_square)
-    noise = ErrorNoise.fit(closest.errors, closest.split.segments)
-    lack = measure_lack(
-        [entry.model for entry in compared],
-        [sizes[at] for at in places],
-        [noise.measure(entry.errors) for entry in compared],
-        noise.samples,
-        terms,
-    )
+    squares, samples = measure_squares(compared)
+    models, own = [entry.model for entry in compared], [sizes[at] for at in places]
+    lack = measure_lack(models, own, squares, samples, terms)
     return dict(zip(places, lack.tolist(), strict=True))
 
 
-def recommend_fittest(
-    assessments: Sequence[Assessment], mode: str, hysteresis: bool, unit: str = ""
-) -> Recommendation:
+def recommend_fittest(assessments: Sequence[Assessment], mode: str) -> Recommendation:
     """Choose the model with the least error on the estimation data, as Appendix A of the paper does.
 
     The validation data have no influence: the free run of the model on them may diverge.
@@ -229,59 +223,11 @@ def recommend_fittest(
         Assessments in the order of the ranks.
     mode : str
         An entry of ``MODES``: the simulation whose error the search minimised.
-    hysteresis : bool
-        Whether models need Property 1.
-    unit : str
-        Unit of the output, for the reason.
     """
     errors = [entry.metrics["estimation"][mode].rmse for entry in assessments]
-    chosen = min(range(len(errors)), key=lambda at: (inf if isnan(errors[at]) else errors[at], at))
-    size = f"{errors[chosen]:.4g} {unit}".rstrip()
-    reason = f"least error of the search on the estimation data ({mode.replace('_', ' ')}), RMSE {size}"
-    entry = assessments[chosen]
-    if not is_sound(entry.physics, hysteresis):
-        return Recommendation(chosen + 1, (reason,))
-    checks = _describe_passed(hysteresis, entry.final_physics)
-    return Recommendation(chosen + 1, tuple(filter(None, (reason, checks))))
-
-
-def list_rivals(
-    found: Recommendation, sizes: Sequence[float], assessments: Sequence[Assessment]
-) -> tuple[Exclusion, ...]:
-    """Return the excluded models that would be preferred without the reason that excludes them.
-
-    They lack Property 1 and have a smaller error than the reference, or they fail the physics checks and are
-    smaller than the recommended model.
-    """
-    if found.reference is None:
-        return ()
-    best, size = assessments[found.reference - 1], sizes[found.rank - 1]
-
-    def is_rival(reason: str, rank: int) -> bool:
-        if reason == PROPERTY_1:
-            return assessments[rank - 1].validation_error < best.validation_error
-        return reason == CHECKS and sizes[rank - 1] < size
-
-    rivals = (
-        replace(each, ranks=tuple(rank for rank in each.ranks if is_rival(each.reason, rank)))
-        for each in found.excluded
+    return Recommendation(
+        1 + min(range(len(errors)), key=lambda at: (inf if isnan(errors[at]) else errors[at], at))
     )
-    return tuple(each for each in rivals if each.ranks)
-
-
-def describe_exclusion(exclusion: Exclusion, assessments: Sequence[Assessment]) -> str:
-    """State what excludes some models, to be read after their names."""
-    if exclusion.reason == PROPERTY_1:
-        return "without Property 1"
-    return _describe_divergence([assessments[rank - 1].physics for rank in exclusion.ranks])
-
-
-def _describe_divergence(physics: Sequence[PhysicsChecks]) -> str:
-    """State at which holds and excursions some models diverge."""
-    levels = sorted({abs(hold.level) for each in physics for hold in each.holds if not hold.bounded})
-    names = dict.fromkeys(test.name for each in physics for test in each.excursions if not test.bounded)
-    held = f"inputs held at {' and '.join(f'{level:g}' for level in levels)} times their recorded amplitude"
-    return f"with a divergence at {' and at '.join([*([held] if levels else []), *names])}"
 
 
 def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
@@ -290,112 +236,3 @@ def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
         excursion.bounded for excursion in physics.excursions
     )
     return bounded and (physics.property_1 or not hysteresis)
-
-
-def _describe_choice(
-    found: Recommendation,
-    sizes: Sequence[float],
-    assessments: Sequence[Assessment],
-    unit: str,
-    accurate: bool,
-) -> str:
-    """State the criterion, the errors, and the excluded models that the criterion would prefer."""
-    chosen, best = (assessments[rank - 1] for rank in (found.rank, found.reference or found.rank))
-    error, least = (_write_error(entry.validation_error, unit) for entry in (chosen, best))
-    criterion = "information criterion of the free run on all data"
-    rivals = [
-        f"{_write_models(each.ranks, assessments, unit)} {describe_exclusion(each, assessments)}"
-        for each in list_rivals(found, sizes, assessments)
-    ]
-    end = f"; left out: {' and '.join(rivals)}" if rivals else ""
-    if chosen is best or accurate:
-        return f"most evidence ({criterion}), RMSE on the validation data {error}{end}"
-    if is_linear(chosen.model) and any(not is_linear(each.model) for each in assessments):
-        return (
-            f"linear: no nonlinear model has decisively more evidence ({criterion}); RMSE on the validation "
-            f"data {error}{end}"
-        )
-    return (
-        f"smallest of the models whose evidence ({criterion}) does not differ decisively: RMSE on the "
-        f"validation data {error}, {least} of the model with the most evidence{end}"
-    )
-
-
-def _write_error(error: float, unit: str) -> str:
-    return f"{error:.4g} {unit}".rstrip()
-
-
-def _write_models(ranks: Sequence[int], assessments: Sequence[Assessment], unit: str) -> str:
-    """Return the number of some models, with their errors on the validation data."""
-    errors = [assessments[rank - 1].validation_error for rank in ranks]
-    limits = dict.fromkeys(f"{error:.4g}" for error in (min(errors), max(errors)))
-    return f"{len(ranks)} (RMSE {' to '.join(limits)}{unit and f' {unit}'})"
-
-
-def _describe_physics(
-    found: Recommendation, assessments: Sequence[Assessment], hysteresis: bool, unit: str
-) -> str:
-    """State the levels at which the model is bounded, or which models pass the checks that it fails.
-
-    Empty if the model was not checked.
-    """
-    entry = assessments[found.rank - 1]
-    if entry.physics.not_computed:
-        return ""
-    if is_sound(entry.physics, hysteresis):
-        return _describe_passed(hysteresis, entry.final_physics)
-    passing = [
-        at
-        for at, each in enumerate(assessments, start=1)
-        if each.outcomes["validation"]["free_run"] and is_sound(each.physics, hysteresis)
-    ]
-    checks = _list_checks("bounded", max(map(abs, LEVELS)), "", hysteresis and not passing)
-    if not passing:
-        return f"no model passes the physics checks ({checks})"
-    return (
-        f"the data contradict the physics checks ({checks}): the models that pass them have larger errors on "
-        f"the validation or the estimation data, {_write_models(passing, assessments, unit)}"
-    )
-
-
-def _describe_passed(hysteresis: bool, physics: PhysicsChecks) -> str:
-    """State the levels at which a model that passes the physics checks is bounded; empty if not checked."""
-    if physics.not_computed:
-        return ""
-    beyond = [abs(each.level) for each in physics.extremes if not each.plausible]
-    held = max(
-        (abs(each.level) for each in physics.extremes if abs(each.level) < min(beyond, default=inf)),
-        default=0,
-    )
-    held = max(held, *map(abs, LEVELS))
-    moves = _describe_motion(held, physics)
-    state, remark = ("no divergence", f" (where {moves})") if moves else ("bounded", "")
-    return _list_checks(state, held, remark, hysteresis)
-
-
-def _list_checks(state: str, held: float, remark: str, hysteresis: bool) -> str:
-    factors = {
-        kind: " and ".join(f"{factor:g}" for named, factor in EXCURSIONS if named == kind)
-        for kind in ("amplitude", "rate")
-    }
-    return (
-        f"{state} at inputs held at up to {held:g} times their recorded amplitude about the midpoint{remark}"
-        f", at {factors['amplitude']} times the amplitude and at {factors['rate']} times the rate"
-        f"{', and Property 1 holds' if hysteresis else ''}"
-    )
-
-
-def _describe_motion(held: float, physics: PhysicsChecks) -> str:
-    """State how the output leaves its recorded range at held inputs; empty if it rests in or near it.
-
-    A hold cannot show that an output which moves on, as that of an integrator, is bounded.
-    """
-    tests = [each for each in physics.extremes if abs(each.level) <= held]
-    ranges, drift = (
-        max(values, default=0.0) for values in ([t.ranges for t in tests], [t.drift for t in tests])
-    )
-    if ranges <= _NEAR and drift <= _STILL:
-        return ""
-    leaves = f"leaves its recorded range by up to {ranges:.3g} ranges" if ranges > 0.0 else ""
-    moves = "is still moving at the end" if drift > _STILL else ""
-    return f"the output {' and '.join(filter(None, (leaves, moves)))}"

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import cycle, product
 from operator import attrgetter
 
 import numpy as np
@@ -280,10 +281,12 @@ class Search:
             small = list(reduce_model(response, range(2, min(_GROUP, self.max_order) + 1)))
             small += self._reduce_inputs(response, np.zeros(shape[1], np.int64))
             self.steps.check("linear models of several orders")
+            least = min(map(self._expect, small), default=np.inf)
             # Many modes are a sum, whose zeros are all free.
-            large = list(reduce_model(response, range(_GROUP + 1, self.max_order + 1), excess=1))
+            bound = float(np.log(self.signals.samples)), least
+            large = list(reduce_model(response, range(_GROUP + 1, self.max_order + 1), 0, 1, bound))
             self._keep_reduced(small)
-            if min(map(self._expect, large), default=np.inf) < min(map(self._expect, small), default=np.inf):
+            if min(map(self._expect, large), default=np.inf) < least:
                 self._keep_reduced(large)
         self._grow()
         best = self.best.structure
@@ -573,20 +576,22 @@ class Search:
 
     def _move_delays(self, fit: Fit) -> Fit:
         """Return the fit with dead times that were moved as long as the error falls."""
-        improved = True
-        while improved:
-            improved = False
-            self.steps.check("dead times of a linear model")
-            for output, place in np.ndindex(fit.structure.delays.shape):
-                for change in _CHANGES:
-                    delay = int(fit.structure.delays[output, place]) + change
-                    moved = self._with_delay(fit, output, place, delay)
-                    if moved is None:
-                        continue
-                    cost = moved.criterion - moved.deviance
-                    moved = minimise(self.signals, moved, 4, 2.0, fit.criterion - cost)
-                    if moved.criterion < fit.criterion - 1e-3:
-                        fit, improved = moved, True
+        moves = list(product(*map(range, fit.structure.delays.shape), _CHANGES))
+        failed = 0
+        for output, place, change in cycle(moves):
+            if failed == len(moves):
+                break
+            if not failed:
+                self.steps.check("dead times of a linear model")
+            failed += 1
+            delay = int(fit.structure.delays[output, place]) + change
+            moved = self._with_delay(fit, output, place, delay)
+            if moved is None:
+                continue
+            cost = moved.criterion - moved.deviance
+            moved = minimise(self.signals, moved, 4, 2.0, fit.criterion - cost)
+            if moved.criterion < fit.criterion - 1e-3:
+                fit, failed = moved, 0
         return fit
 
     def _colour(self, fit: Fit) -> Fit:

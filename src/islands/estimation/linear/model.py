@@ -7,7 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.estimation.linear.regression import Fit, Structure, linearise, map_parameters, move
+from islands.estimation.linear.regression import (
+    Fit,
+    Structure,
+    linearise,
+    map_parameters,
+    move,
+    project,
+    restrict,
+)
 from islands.estimation.linear.sections import Section, Signal, Signals, find_poles
 from islands.kernels.state_space import simulate_state_space
 from islands.models.state_space import INTEGRATOR_GAINS, Quantity, StateSpace, measure_mode
@@ -176,14 +184,16 @@ def make_model(
 ) -> LinearModel:
     """Return the model of a fit in the units of the record, with standard errors.
 
-    Rivals are fits of other structures. Those with the same modes add to the standard errors by the weight
-    that the deviance on another record gives them (Buckland, Burnham & Augustin 1997): a structure of fewer
-    parameters may have a bias that the criterion of Schwarz does not detect.
+    Rivals are fits after a change of the structure. Those with the same modes add to the standard errors by
+    the weight that the deviance on another record gives them against the best fit (Buckland, Burnham &
+    Augustin 1997): a structure of fewer parameters may have a bias that the criterion of Schwarz does not
+    detect. Changes do not exclude each other, so that every one adds its part.
     """
     structure, outputs = fit.structure, len(fit.coefficients)
-    best, theta = _estimate(signals, fit, scales), _pack(fit)
-    others = [_estimate(signals, each, scales) for each in rivals]
-    weights = [np.exp(0.5 * (fit.expected_deviance - each.expected_deviance)) for each in rivals]
+    noise, theta = restrict(signals, fit).structure.noise, _pack(fit)
+    best, *others = [_estimate(signals, each, scales, noise) for each in (fit, *rivals)]
+    gains = np.array([fit.expected_deviance - each.expected_deviance for each in rivals])
+    weights = (0.5 + 0.5 * np.tanh(0.25 * gains)).tolist()
     parts = [
         _realise(fit.coefficients[output], structure, output, scales, signals.samples)
         for output in range(outputs)
@@ -233,34 +243,37 @@ class _MeasuredQuantities(NamedTuple):
         return [(each.name, each.input) for own in self.quantities for each in own]
 
 
-def _estimate(signals: Signals, fit: Fit, scales: Scales) -> _MeasuredQuantities:
-    covariance, outputs = estimate_covariance(signals, fit), range(len(fit.coefficients))
+def _estimate(signals: Signals, fit: Fit, scales: Scales, noise: tuple[Signal, ...]) -> _MeasuredQuantities:
+    """Return the quantities of a fit, with the covariance that another noise gives them."""
+    weighed = project(signals, replace(fit.structure, noise=noise)) or fit
+    covariance, outputs = estimate_covariance(signals, weighed), range(len(fit.coefficients))
 
-    def measure(values: Signal) -> list[list[Quantity]]:
-        found = _unpack(values, fit)
+    def measure(values: Signal, near: Fit = weighed) -> list[list[Quantity]]:
+        found = _unpack(values, near)
         if found is None:
             return [[] for _ in outputs]
         moved, coefficients = found
         return [list(_measure(moved, coefficients[output], output, scales)) for output in outputs]
 
-    theta = _pack(fit)
-    quantities = tuple(map(tuple, measure(theta)))
-    return _MeasuredQuantities(quantities, _propagate(measure, quantities, theta, covariance), covariance)
+    quantities = tuple(map(tuple, measure(_pack(fit), fit)))
+    errors = _propagate(measure, quantities, _pack(weighed), covariance)
+    return _MeasuredQuantities(quantities, errors, covariance)
 
 
 def _average(
     best: _MeasuredQuantities, others: Sequence[_MeasuredQuantities], weights: Sequence[float]
 ) -> tuple[tuple[float, ...], ...]:
-    """Return the standard errors of the best estimate over the structures that may be the true one."""
+    """Return the standard errors of the best estimate, where every change is in the law or not."""
     variances: list[Signal] = [np.square(each) for each in best.errors]
-    total = 1.0
+    errors: list[Signal] = [np.array(each) for each in variances]
     for other, weight in zip(others, weights, strict=True):
-        if other.kinds == best.kinds and np.isfinite(np.concatenate(other.errors)).all():
-            total += weight
+        if other.kinds == best.kinds:
             for output, (one, two) in enumerate(zip(best.quantities, other.quantities, strict=True)):
                 moved = [x.value - y.value for x, y in zip(one, two, strict=True)]
-                variances[output] += weight * (np.square(other.errors[output]) + np.square(moved))
-    return tuple(tuple(np.sqrt(each / total).tolist()) for each in variances)
+                square = np.square(other.errors[output]) + np.square(moved)
+                # A dead time may have no value where the response to an input begins.
+                variances[output] += weight * np.fmax(square - errors[output], 0.0)
+    return tuple(tuple(np.sqrt(each).tolist()) for each in variances)
 
 
 def estimate_covariance(signals: Signals, fit: Fit) -> Signal:
@@ -307,7 +320,8 @@ def _unpack(values: Signal, fit: Fit) -> tuple[Structure, list[Signal]] | None:
         fractions[output, early] = values[at : at + early.size]
         at += early.size
     moved = replace(structure, sections=move(structure.sections, values[at:]), fractions=fractions)
-    mappings = [map_parameters(moved, output, fit.signals.samples) for output in range(len(own))]
+    samples = fit.signals.samples
+    mappings = [map_parameters(structure, output, samples, moved) for output in range(len(own))]
     coefficients = []
     for output, (mapping, parameters) in enumerate(zip(mappings, own, strict=True)):
         if mapping is None:

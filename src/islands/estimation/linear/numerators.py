@@ -6,6 +6,7 @@ would be more parameters, as most of its zeros follow from sampling (Astrom, Hag
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,28 +17,33 @@ from islands.estimation.linear.sections import Section, Signal
 _SEPARATION = 1e-5
 
 
-def map_numerators(
-    poles: NDArray[np.complex128], sizes: Sequence[int], zeros: int, early: Signal | None
-) -> Signal | None:
-    """Return what the numerators of sections are for each coefficient in continuous time.
+class Residues(NamedTuple):
+    """Residues of poles in continuous time for each coefficient of a numerator.
+
+    Attributes
+    ----------
+    poles, rates : ndarray, shape (points, order)
+        In discrete and in continuous time, of several systems that are near the first one.
+    growth : ndarray, shape (points, order)
+        Response of each pole to an input of 1 for a sample.
+    values : ndarray, shape (points, order, zeros + 1)
+    """
+
+    poles: NDArray[np.complex128]
+    rates: NDArray[np.complex128]
+    growth: NDArray[np.complex128]
+    values: NDArray[np.complex128]
+
+
+def find_residues(poles: NDArray[np.complex128], zeros: int) -> Residues | None:
+    """Return the residues of poles in discrete time; None if one has no continuous time.
 
     Parameters
     ----------
     poles : ndarray, shape (points, order)
-        In discrete time, in the order of the sections; of several systems that are near the first one.
-    sizes : sequence of int
-        Orders of the sections.
+        In the order of the sections; of several systems that are near the first one.
     zeros : int
         Zeros in continuous time.
-    early : ndarray, shape (points,), optional
-        Part of a sample by which the response begins before the sample that the numerators begin with; the
-        direct term is then in the last row.
-
-    Returns
-    -------
-    ndarray, shape (points, rows, zeros + 1), optional
-        Rows of the coordinates of `regression.Fit.coefficients`. None if a pole has no continuous time, or
-        poles are so fast that numerators overflow.
     """
     if np.any((poles.imag == 0.0) & (poles.real <= 0.0)):
         return None
@@ -46,23 +52,43 @@ def map_numerators(
     unit = float(np.exp(np.log(moving).mean())) if moving.size else 1.0
     rates = _separate((rates / unit).astype(np.complex128))
     differences = rates[:, :, None] - rates[:, None] + np.eye(rates.shape[1])
-    residues = rates[:, :, None] ** np.arange(zeros + 1) / differences.prod(axis=2)[:, :, None]
+    values = rates[:, :, None] ** np.arange(zeros + 1) / differences.prod(axis=2)[:, :, None]
     rates *= unit
-    weights, poles = _grow(rates), np.exp(rates)
-    found = np.empty((*rates.shape, zeros + 1))
+    return Residues(np.exp(rates), rates, _grow(rates), values)
+
+
+def map_numerators(residues: Residues, sizes: Sequence[int], early: Signal | None) -> Signal | None:
+    """Return what the numerators of sections are for each coefficient in continuous time.
+
+    Parameters
+    ----------
+    residues : Residues
+    sizes : sequence of int
+        Orders of the sections.
+    early : ndarray, shape (points,), optional
+        Part of a sample by which the response begins before the sample that the numerators begin with; the
+        direct term is then in the last row.
+
+    Returns
+    -------
+    ndarray, shape (points, rows, zeros + 1), optional
+        Rows of the coordinates of `regression.Fit.coefficients`. None if poles are so fast that numerators
+        overflow.
+    """
+    poles, rates, weights, values = residues
+    found = np.empty((len(poles), poles.shape[1] + (early is not None), values.shape[2]))
     if early is not None:
-        found = np.empty((rates.shape[0], rates.shape[1] + 1, zeros + 1))
         parts = early[:, None] * _grow(early[:, None] * rates)
-        found[:, -1] = (parts[:, :, None] * residues).sum(axis=1).real
+        found[:, -1] = (parts[:, :, None] * values).sum(axis=1).real
         weights = weights * np.exp(early[:, None] * rates)
-    residues *= weights[:, :, None]
+    values = values * weights[:, :, None]
     at = 0
     for size in sizes:
-        one = residues[:, at]
+        one = values[:, at]
         if size == 1:
             found[:, at] = one.real
         else:
-            other, pole, last = residues[:, at + 1], poles[:, at, None], poles[:, at + 1, None]
+            other, pole, last = values[:, at + 1], poles[:, at, None], poles[:, at + 1, None]
             found[:, at] = (one * (1.0 - last) + other * (1.0 - pole)).real
             found[:, at + 1] = (one * last + other * pole).real
         at += size

@@ -5,7 +5,7 @@ the coefficients (Sanathanan & Koerner 1963). Partial fractions of the poles bef
 (Gustavsen & Semlyen 1999). The weights are those of the deviance that the difference of the models costs.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -127,9 +127,17 @@ def reduce_inputs(
 
 
 def reduce_model(
-    response: Response, orders: Iterable[int], integrators: int = 0, excess: int = 2
+    response: Response,
+    orders: Sequence[int],
+    integrators: int = 0,
+    excess: int = 2,
+    bound: tuple[float, float] = (0.0, np.inf),
 ) -> Iterator[Reduced]:
-    """Yield a transfer function for each order and each number of zeros, less by an excess or more."""
+    """Yield a transfer function for each order and each number of zeros, less by an excess or more.
+
+    The bound is the cost of a parameter, and the largest cost of interest. Transfer functions are left out
+    that exceed it with the loss of the largest one, as no part of that one has a smaller loss.
+    """
     frequencies = response.frequencies
     s = 1j * frequencies
     # In units of the integrators, and of the input that is held.
@@ -141,30 +149,41 @@ def reduce_model(
         return
     share = np.cumsum(power) / power.sum()
     low, high = frequencies[np.searchsorted(share, [0.02, 0.98])]
+
+    def begin(order: int) -> Spectrum:
+        return -np.geomspace(max(low, 1e-4), 2.0 * max(high, low), order - integrators) + 0.0j
+
+    def search(poles: Spectrum, zeros: int, place: int) -> tuple[Reduced, int]:
+        """Return the best transfer function over the dead times near those of the model, and its place."""
+        found: dict[int, Reduced] = {}
+        # The loss has one minimum.
+        waiting = [place, place - 1, place + 1]
+        while waiting:
+            at = waiting.pop(0)
+            if at in found or not 0 <= at < len(_EARLIER):
+                continue
+            delays = np.maximum(response.delays - _EARLIER[at], 0)
+            moved = target * np.exp(-s * (response.delays - delays)[:, :, None])
+            moving, loss = _iterate(s, moved, weights, poles, zeros)
+            drives = np.ones((*delays.shape, poles.size), bool)
+            own, all_zeros = np.full_like(delays, integrators), np.full_like(delays, zeros)
+            found[at] = Reduced(moving, drives, loss, own, all_zeros, delays)
+            place = min(found, key=lambda each: found[each].loss)
+            waiting += [each for each in (place - 1, place + 1) if each not in found and each not in waiting]
+        return found[place], place
+
+    place, (penalty, largest) = _EARLIER.index(0), bound
+    least = 0.0
+    if orders and np.isfinite(largest):
+        least = search(begin(max(orders)), max(orders) - excess, place)[0].loss
     for order in orders:
-        count = order - integrators
-        poles: Spectrum = -np.geomspace(max(low, 1e-4), 2.0 * max(high, low), count) + 0.0j
-        place = _EARLIER.index(0)
+        poles = begin(order)
         for zeros in range(order - excess + 1):
-            found: dict[int, Reduced] = {}
-            # The loss has one minimum over the dead times near those of the model.
-            waiting = [place, place - 1, place + 1]
-            while waiting:
-                at = waiting.pop(0)
-                if at in found or not 0 <= at < len(_EARLIER):
-                    continue
-                delays = np.maximum(response.delays - _EARLIER[at], 0)
-                moved = target * np.exp(-s * (response.delays - delays)[:, :, None])
-                moving, loss = _iterate(s, moved, weights, poles, zeros)
-                drives = np.ones((*delays.shape, count), bool)
-                own, all_zeros = np.full_like(delays, integrators), np.full_like(delays, zeros)
-                found[at] = Reduced(moving, drives, loss, own, all_zeros, delays)
-                place = min(found, key=lambda each: found[each].loss)
-                waiting += [
-                    each for each in (place - 1, place + 1) if each not in found and each not in waiting
-                ]
-            poles = found[place].poles
-            yield found[place]
+            if least + penalty * (poles.size + zeros * response.delays.size) > largest:
+                break
+            found, place = search(poles, zeros, place)
+            poles = found.poles
+            yield found
 
 
 def sample_fit(fit: Fit) -> Response:
@@ -228,21 +247,22 @@ def _iterate(
     unit = float(np.exp(np.log(np.abs(poles) + 1e-12).mean()))
     powers, wanted = (s / unit) ** np.arange(zeros + 1)[:, None], target * weights
     best = poles, np.inf
-    for _ in range(_ITERATIONS + 1):
+    for left in range(_ITERATIONS, -1, -1):
         numerators = powers / np.prod((s - poles[:, None]) / unit, axis=0)
         fractions, mix = _list_fractions(s, poles)
-        rows = []
-        for goal, weight in zip(wanted.reshape(-1, s.size), weights.reshape(-1, s.size), strict=True):
-            columns = _list_parts(weight * numerators)
-            basis = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
-            equations = _list_parts(np.vstack([goal * fractions, goal]))
-            rows.append(equations - basis @ (basis.T @ equations))
-        matrix = np.vstack(rows)
+        # The numerators are eliminated, and the last column is the error with those of these poles.
+        parts = np.concatenate(
+            [weights[:, :, None] * numerators, wanted[:, :, None] * fractions, wanted[:, :, None]], axis=2
+        )
+        columns = np.concatenate([parts.real, parts.imag], axis=3).reshape(-1, parts.shape[2], 2 * s.size)
+        factors = np.asarray(np.linalg.qr(columns.swapaxes(1, 2), mode="r"))
+        matrix = factors[:, zeros + 1 :, zeros + 1 :].reshape(-1, poles.size + 1)
         if not np.isfinite(matrix).all():
             break
-        # The last column is the error with the numerators of these poles.
         loss = float(matrix[:, -1] @ matrix[:, -1])
         best = (poles, loss) if loss < best[1] else best
+        if not left:
+            break
         norms = np.linalg.norm(matrix, axis=0) + 1e-300
         change = np.linalg.lstsq(matrix[:, :-1] / norms[:-1], -matrix[:, -1], rcond=1e-12)[0] / norms[:-1]
         if not np.isfinite(change).all():
@@ -261,11 +281,6 @@ def _iterate(
         if not poles.all():
             break
     return best
-
-
-def _list_parts(rows: Spectrum) -> Signal:
-    """Return the real parts of all columns, and the imaginary ones after them."""
-    return np.asarray(np.hstack([rows.real, rows.imag]).T, np.float64)
 
 
 def _list_fractions(s: Spectrum, poles: Spectrum) -> tuple[Spectrum, Spectrum]:

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.estimation.linear.noise import limit_zeros
-from islands.estimation.linear.numerators import find_rest, map_numerators
+from islands.estimation.linear.numerators import Residues, find_residues, find_rest, map_numerators
 from islands.estimation.linear.sections import (
     INTEGRATORS,
     Section,
     Signal,
     Signals,
+    find_point_poles,
     find_poles,
     is_stable,
     pair_poles,
@@ -35,6 +36,9 @@ _NEGLIGIBLE = 1e-3
 
 #: Halvings of a step.
 _MAX_HALVINGS = 8
+
+#: Part of a standard error by which the noise is moved for the derivatives of the restricted likelihood.
+_NOISE_STEP = 0.1
 
 #: Part by which poles and dead times are moved for the derivatives of numerators.
 _MOVED = 1e-5
@@ -215,6 +219,8 @@ class Fit:
     parameters : tuple of ndarray
         Linear parameters of every output: of every input the coefficients of the sections and, if it leads,
         of the direct term, or those of the numerator in continuous time; last the constant.
+    mappings : tuple of ndarray
+        What tied states and coefficients of every output are for them.
     coefficients : tuple of ndarray
         The coefficients that follow.
     states : tuple of ndarray
@@ -229,6 +235,7 @@ class Fit:
     signals: Signals
     structure: Structure
     parameters: tuple[Signal, ...]
+    mappings: tuple[Signal, ...]
     coefficients: tuple[Signal, ...]
     states: tuple[Signal, ...]
     squares: Signal
@@ -301,7 +308,7 @@ def project(signals: Signals, structure: Structure) -> Fit | None:
         is_invertible(each, signals.samples) for each in structure.noise
     ):
         return None
-    recordings, parameters, coefficients, states = signals.ends.size, [], [], []
+    recordings, parameters, mappings, coefficients, states = signals.ends.size, [], [], [], []
     squares = np.empty(len(structure.noise))
     for output, noise in enumerate(structure.noise):
         mapping = map_parameters(structure, output, signals.samples)
@@ -319,31 +326,49 @@ def project(signals: Signals, structure: Structure) -> Fit | None:
         starts[:, untied] = [_solve_states(rows, found.values) for rows in own]
         squares[output] = found.squares
         parameters.append(found.values)
+        mappings.append(mapping)
         coefficients.append(values[-zero.size :])
         states.append(starts)
     if not np.isfinite(squares).all():
         return None
     counts = np.full(squares.size, float(signals.samples - structure.skipped * recordings))
-    return Fit(signals, structure, tuple(parameters), tuple(coefficients), tuple(states), squares, counts)
+    linear = tuple(parameters), tuple(mappings), tuple(coefficients), tuple(states)
+    return Fit(signals, structure, *linear, squares, counts)
 
 
-def map_parameters(structure: Structure, output: int, samples: int) -> Signal | None:
+def map_parameters(
+    structure: Structure, output: int, samples: int, moved: Structure | None = None
+) -> Signal | None:
     """Return what tied states and coefficients of an output are for its linear parameters.
+
+    Parameters
+    ----------
+    structure : Structure
+        Numerators in continuous time have the unit of its poles.
+    output, samples : int
+    moved : Structure, optional
+        One near it, whose mapping of the same parameters is returned; by default the structure itself.
 
     Returns
     -------
     ndarray, shape (recordings * tied + coefficients, parameters), optional
         None if numerators need the continuous time of a pole that has none.
     """
-    mapping = _map_points(structure, output, samples, [structure])
-    return None if mapping is None else mapping[0]
+    if structure.is_free(output):
+        return np.eye(structure.count_coefficients(output))
+    mapping = _map_points(structure, output, samples, [structure, *([moved] if moved else [])])
+    return None if mapping is None else mapping[-1]
 
 
 def _map_points(
     structure: Structure, output: int, samples: int, points: Sequence[Structure]
 ) -> Signal | None:
     """Return the mappings of structures that differ in poles and fractions, as the first axis."""
-    blocks = [_map_input(structure, output, place, points) for place in range(structure.delays.shape[1])]
+    poles, known = find_point_poles([point.parts for point in points]), dict[bytes, Residues | None]()
+    blocks = []
+    for place in range(structure.delays.shape[1]):
+        early = np.array([point.fractions[output, place] for point in points])
+        blocks.append(_map_input(structure, output, place, poles, early, known))
     kept = [block for block in blocks if block is not None]
     if len(kept) < len(blocks):
         return None
@@ -390,24 +415,39 @@ def _list_rests(structure: Structure) -> list[tuple[int, Signal]]:
     ]
 
 
-def _map_input(structure: Structure, output: int, place: int, points: Sequence[Structure]) -> Signal | None:
-    """Return what the coefficients of an input are for its parameters, of structures near each other."""
+def _map_input(
+    structure: Structure,
+    output: int,
+    place: int,
+    poles: NDArray[np.complex128],
+    early: Signal,
+    known: dict[bytes, Residues | None],
+) -> Signal | None:
+    """Return what the coefficients of an input are for its parameters, for several poles and fractions.
+
+    Residues are those of equal numbers of zeros and driven modes, so that inputs share them.
+    """
     leads, excess = bool(structure.leads[output, place]), int(structure.excess[output, place])
     drives = structure.drives[output, place]
     sizes = [part.size for part in structure.parts]
     rows = np.repeat(drives, sizes)
     if excess > 1 and rows.any():
-        early = np.array([each.fractions[output, place] for each in points]) if leads else None
-        poles = np.array([find_poles(each.parts) for each in points])[:, rows]
+        zeros, key = (
+            max(int(rows.sum()) - excess, 0),
+            drives.tobytes() + bytes([min(excess, int(rows.sum()))]),
+        )
+        if key not in known:
+            known[key] = find_residues(poles[:, rows], zeros)
+        residues = known[key]
         driven = [size for size, is_driven in zip(sizes, drives, strict=True) if is_driven]
-        own = map_numerators(poles, driven, max(int(rows.sum()) - excess, 0), early)
+        own = None if residues is None else map_numerators(residues, driven, early if leads else None)
         if own is None:
             return None
     else:
-        own = np.repeat(np.eye(int(rows.sum()) + leads)[None], len(points), axis=0)
+        own = np.repeat(np.eye(int(rows.sum()) + leads)[None], len(poles), axis=0)
     if rows.all():
         return own
-    block = np.zeros((len(points), structure.order + leads, own.shape[2]))
+    block = np.zeros((len(poles), structure.order + leads, own.shape[2]))
     block[:, np.append(rows, np.ones(int(leads), bool))] = own
     return block
 
@@ -555,9 +595,9 @@ def linearise(signals: Signals, fit: Fit) -> list[OutputFactor] | None:
         if structure.is_free(output):
             found.append(OutputFactor(rows[0], parameters.size + noise))
             continue
-        matrix = map_parameters(structure, output, signals.samples)
+        matrix = fit.mappings[output]
         slopes = differentiate_mapping(structure, output, signals.samples, parameters)
-        if matrix is None or slopes is None:
+        if slopes is None:
             return None
         # The rows are tied states, coefficients, noise, poles and the error.
         rest = np.eye(noise + structure.free + 1)
@@ -664,6 +704,58 @@ def minimise(signals: Signals, fit: Fit, steps: int, least: float = 1e-3, goal: 
         if gain < least:
             break
     return fit
+
+
+def restrict(signals: Signals, fit: Fit) -> Fit:
+    """Return a fit with noise of the largest restricted likelihood, by a step.
+
+    The parameters of the system absorb a part of the noise at the frequencies that determine them, so that
+    its spectrum is too small there. The restricted likelihood has the determinant of their information
+    (Patterson & Thompson 1971); its derivatives by the noise lead from the largest likelihood to its own.
+    """
+    factors, noise = linearise(signals, fit), list(fit.structure.noise)
+    for output, each in enumerate(factors or []):
+        if noise[output].size:
+            noise[output] = _restrict_output(signals, fit, output, each)
+    return project(signals, replace(fit.structure, noise=tuple(noise))) or fit
+
+
+def _restrict_output(signals: Signals, fit: Fit, output: int, each: OutputFactor) -> Signal:
+    """Return the noise of one output after the step."""
+    noise = fit.structure.noise[output]
+    cost, triangle = _split_noise(each, fit, output)
+    back = np.asarray(np.linalg.pinv(triangle, rcond=1e-6), np.float64)
+
+    def shift(step: Signal) -> Fit | None:
+        moved = list(fit.structure.noise)
+        moved[output] = noise + (back @ step).reshape(noise.shape)
+        return project(signals, replace(fit.structure, noise=tuple(moved)))
+
+    slopes = np.zeros(noise.size)
+    for place in range(noise.size):
+        found = shift(_NOISE_STEP * np.eye(noise.size)[place])
+        factors = linearise(signals, found) if found else None
+        if found and factors:
+            slopes[place] = (_split_noise(factors[output], found, output)[0] - cost) / _NOISE_STEP
+    steps = (shift(-(0.5**halving) * slopes) for halving in range(_MAX_HALVINGS))
+    found = next(filter(None, steps), fit)
+    return found.structure.noise[output]
+
+
+def _split_noise(each: OutputFactor, fit: Fit, output: int) -> tuple[float, Signal]:
+    """Return the logarithm of the determinant of all parameters but the noise, and the factor of the noise.
+
+    The squares of changes of the noise by the factor are those that the deviance grows by, times 2.
+    """
+    count, size = fit.parameters[output].size, fit.structure.noise[output].size
+    places = np.arange(each.factor.shape[1] - 1)
+    is_noise = (places >= count) & (places < count + size)
+    columns = each.factor[:, np.append(places[~is_noise], places[is_noise])]
+    triangle = np.asarray(np.linalg.qr(columns, mode="r"))
+    diagonal = np.abs(np.diag(triangle))[: places.size - size]
+    unit = np.sqrt(2.0 * fit.counts[output] / max(fit.squares[output], np.finfo(float).tiny))
+    determined = diagonal > _DEPENDENT * np.abs(columns).max(initial=0.0)
+    return 2.0 * float(np.log(diagonal[determined]).sum()), unit * triangle[-size:, -size:]
 
 
 def predict(signals: Signals, fit: Fit) -> float:

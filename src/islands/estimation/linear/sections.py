@@ -89,6 +89,27 @@ def find_poles(sections: Sequence[Section]) -> NDArray[np.complex128]:
     return np.array([pole for section in sections for pole in _find_roots(*section.tolist())], np.complex128)
 
 
+def find_point_poles(points: Sequence[Sequence[Section]]) -> NDArray[np.complex128]:
+    """Return the poles of sections of several systems of equal orders, shape (points, order)."""
+    if len(points) == 1:
+        return find_poles(points[0])[None]
+    columns = []
+    for sections in zip(*points, strict=True):
+        first, *last = np.array(sections).T
+        if not last:
+            columns.append(-first)
+            continue
+        middle, square = -0.5 * first, 0.25 * first * first - last[0]
+        root, is_pair = np.sqrt(np.abs(square)), square < 0.0
+        larger = middle + np.copysign(root, middle)
+        smaller = np.divide(last[0], larger, out=np.zeros_like(larger), where=larger != 0.0)
+        columns += [
+            np.where(is_pair, middle + 1j * root, larger),
+            np.where(is_pair, middle - 1j * root, smaller),
+        ]
+    return np.array(columns, np.complex128).reshape(-1, len(points)).T
+
+
 def _find_roots(first: float, last: float | None = None) -> tuple[complex, ...]:
     """Return the poles of a section."""
     if last is None:

@@ -30,7 +30,8 @@ from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
 from islands.validation.evidence import is_static, measure_size, name_form
-from islands.validation.recommendation import describe_exclusion, list_rivals, recommend
+from islands.validation.recommendation import recommend
+from islands.validation.recommendation_reasons import describe_exclusion, list_rivals
 
 #: Largest error of hysteresis on all data, relative to the least, if the output rests while the inputs rest,
 #: because its models keep that property.

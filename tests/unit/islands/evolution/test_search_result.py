@@ -4,6 +4,8 @@ import itertools
 from math import nan
 from types import SimpleNamespace
 
+import numpy as np
+
 import islands
 from islands.evolution.search_result import keep_best_of_sizes, rank_models
 from islands.models.latent import LatentModel
@@ -46,6 +48,16 @@ def test_ties_are_broken_by_size_and_then_by_text():
     assert_ranked_in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))
 
 
+class Entry(SimpleNamespace):
+    """An assessment, which is compared by its identity."""
+
+    __hash__ = object.__hash__
+
+
+#: Errors of variance 1.
+WHITE = np.random.default_rng(0).choice([-1.0, 1.0], 200)
+
+
 def test_the_most_evidence_of_every_size_is_kept_and_the_best_sound_model():
     """The error on all data counts: in the validation data, a constant may be as good as any model."""
 
@@ -53,7 +65,15 @@ def test_the_most_evidence_of_every_size_is_kept_and_the_best_sound_model():
         metrics = {"validation": {"free_run": SimpleNamespace(rmse=validation)}}
         holds = (SimpleNamespace(bounded=bounded),)
         physics = SimpleNamespace(holds=holds, excursions=(), property_1=False)
-        return SimpleNamespace(model=model, mean_square=mean_square, metrics=metrics, physics=physics)
+        errors, split = mean_square**0.5 * WHITE, SimpleNamespace(segments=())
+        return Entry(
+            model=model,
+            mean_square=mean_square,
+            metrics=metrics,
+            physics=physics,
+            errors=errors,
+            split=split,
+        )
 
     one, two = (
         islands.make_model([(islands.parse(text), 0.5) for text in terms])

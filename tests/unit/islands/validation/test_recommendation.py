@@ -10,10 +10,12 @@ import pytest
 from scipy.signal import lfilter
 
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
+from islands.validation import recommendation
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 from islands.validation.physics import ClusterSum, ExcursionTest, ExtremeTest, HoldTest, PhysicsChecks
-from islands.validation.recommendation import Exclusion, list_rivals, recommend, recommend_fittest
+from islands.validation.recommendation import Exclusion
+from islands.validation.recommendation_reasons import list_rivals, state_fit, state_reasons
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 
@@ -71,6 +73,17 @@ class Candidate:
     def make_errors(self):
         validation = WHITE[SAMPLES:][: len(self.blocks)] * np.sqrt(self.blocks)
         return np.append(self.estimated * WHITE[:SAMPLES], validation if len(self.blocks) else np.inf)
+
+
+def recommend(sizes, entries, hysteresis, unit="", accurate=False):
+    """Return a recommendation with its reasons."""
+    found = recommendation.recommend(sizes, entries, hysteresis, accurate)
+    return replace(found, reasons=state_reasons(found, sizes, entries, hysteresis, unit, accurate))
+
+
+def recommend_fittest(entries, mode, hysteresis, unit=""):
+    found = recommendation.recommend_fittest(entries, mode)
+    return replace(found, reasons=state_fit(entries[found.rank - 1], mode, hysteresis, unit))
 
 
 def chosen(*candidates, hysteresis=False):

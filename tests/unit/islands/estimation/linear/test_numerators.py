@@ -3,7 +3,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
-from islands.estimation.linear.numerators import find_rest, map_numerators
+from islands.estimation.linear.numerators import find_residues, find_rest, map_numerators
 from islands.estimation.linear.sections import INTEGRATORS, find_poles, pair_poles
 
 RATES = {
@@ -41,7 +41,9 @@ def test_sections_have_the_response_of_the_system_in_continuous_time(name, early
     free = [np.exp(complex(rate)) for rate in rates if rate != 0.0]
     parts = [*pair_poles(free), *INTEGRATORS[rates.count(0.0)]]
     given = None if early is None else np.array([early])
-    mapped = map_numerators(find_poles(parts)[None], [part.size for part in parts], 1, given)[0]
+    mapped = map_numerators(find_residues(find_poles(parts)[None], 1), [part.size for part in parts], given)[
+        0
+    ]
     columns = []
     for part in parts:
         quotient = lfilter(np.r_[np.zeros(delay + 1), 1.0], np.r_[1.0, part], u)
@@ -54,7 +56,7 @@ def test_sections_have_the_response_of_the_system_in_continuous_time(name, early
 
 
 def test_negative_poles_have_no_continuous_time():
-    assert map_numerators(np.array([[0.5 + 0j, -0.5]]), [2], 0, None) is None
+    assert find_residues(np.array([[0.5 + 0j, -0.5]]), 0) is None
 
 
 @pytest.mark.parametrize("section", [np.array([-0.9]), np.array([-1.5, 0.8])])

@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import lfilter
 
 from islands.estimation.linear.noise import WHITE
-from islands.estimation.linear.numerators import map_numerators
+from islands.estimation.linear.numerators import find_residues, map_numerators
 from islands.estimation.linear.reduction import reduce_model, sample_fit, sample_high_order
 from islands.estimation.linear.regression import make_structure, minimise, project
 from islands.estimation.linear.sections import Signals, find_poles, pair_poles
@@ -17,7 +17,8 @@ def record():
     """Signals of a system of order 3 without zeros and with a dead time of 4 samples, and its sections."""
     random = np.random.default_rng(1)
     u, parts = random.normal(size=2000), pair_poles(np.exp(RATES))
-    numerators = map_numerators(find_poles(parts)[None], [part.size for part in parts], 0, None)[0, :, 0]
+    residues = find_residues(find_poles(parts)[None], 0)
+    numerators = map_numerators(residues, [part.size for part in parts], None)[0, :, 0]
     y = np.zeros(2000)
     for part, own in zip(parts, np.split(numerators, [parts[0].size]), strict=True):
         polynomial = own if own.size == 1 else [own.sum(), -own[1]]
@@ -56,3 +57,15 @@ def test_an_input_that_does_not_move_has_no_response():
         (np.array([-0.9]),), 0, np.array([[0]]), np.array([[False]]), (WHITE,), signals.first
     )
     assert list(reduce_model(sample_fit(project(signals, structure)), [1, 2])) == []
+
+
+def test_a_bound_leaves_out_transfer_functions_that_cost_more(record):
+    signals, _ = record
+    response = sample_high_order(signals, fit_high_order(signals, 20))
+    every = [(each.loss + 7.0 * each.size, each) for each in reduce_model(response, [2, 3, 4, 5])]
+    least = min(cost for cost, _ in every)
+    left = [
+        each.loss + 7.0 * each.size for each in reduce_model(response, [2, 3, 4, 5], bound=(7.0, least + 1.0))
+    ]
+    assert len(left) < len(every)
+    assert min(left) == pytest.approx(least, rel=1e-6)

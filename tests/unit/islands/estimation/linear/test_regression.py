@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from islands.estimation.linear.regression import linearise, make_structure, minimise, move, project
+from islands.estimation.linear.regression import (
+    linearise,
+    make_structure,
+    minimise,
+    move,
+    project,
+    restrict,
+)
 from islands.estimation.linear.sections import Signals
 
 
@@ -68,3 +75,19 @@ def test_steps_never_raise_the_deviance_and_end_at_a_minimum(signals, structure)
         replace(found.structure, noise=(noise + 1e-4,)),
     ):
         assert project(signals, moved).deviance >= found.deviance - 1e-6
+
+
+def test_restricted_noise_is_nearer_to_the_true_one_than_that_of_the_largest_likelihood():
+    random, delays, poles = np.random.default_rng(1), np.zeros((1, 1), np.int64), []
+    start = make_structure(
+        (np.array([-0.9]),), 0, delays, delays > 0, (np.array([[0.9], [0.0]]),), np.zeros((1, 1))
+    )
+    for _ in range(20):
+        u = np.repeat(random.normal(size=8), 25)
+        u[0] = 0.0
+        y = lfilter([0.0, 0.1], [1.0, -0.9], u) + lfilter([1.0], [1.0, -0.9], random.normal(0.0, 0.1, 200))
+        signals = Signals(u[None], y[None], np.array([200]))
+        fit = minimise(signals, project(signals, start), 20)
+        poles.append([each.structure.noise[0][0, 0] for each in (fit, restrict(signals, fit))])
+    likeliest, restricted = np.abs(np.mean(poles, axis=0) - 0.9)
+    assert restricted < 0.7 * likeliest

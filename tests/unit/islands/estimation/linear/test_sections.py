@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from islands.estimation.linear.sections import find_poles, is_stable, pair_poles
+from islands.estimation.linear.sections import find_point_poles, find_poles, is_stable, pair_poles
 
 
 @pytest.mark.parametrize(
@@ -9,6 +9,7 @@ from islands.estimation.linear.sections import find_poles, is_stable, pair_poles
 )
 def test_sections_keep_their_poles(poles):
     found = find_poles(pair_poles(poles))
+    np.testing.assert_array_equal(find_point_poles([pair_poles(poles)] * 2), [found, found])
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.array(poles, complex)), atol=1e-7)
 
 
