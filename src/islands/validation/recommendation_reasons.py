@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
+from islands.models.protocol import DynamicModel
 from islands.validation.assessment import Assessment
 from islands.validation.evidence import is_linear, is_static
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
@@ -42,10 +43,8 @@ def state_reasons(
     """
     if found.reference is None:
         return ("the free run of every model diverges; this one has the least one-step-ahead error",)
-    model = assessments[found.rank - 1].model
-    static = f"static: {model.output_name} depends on the inputs of the same sample only"
     reasons = (
-        static if is_static(model) else "",
+        _describe_static(assessments[found.rank - 1].model),
         _describe_choice(found, sizes, assessments, unit, accurate),
         _describe_physics(found, assessments, hysteresis, unit),
     )
@@ -109,6 +108,13 @@ def _describe_divergence(physics: Sequence[PhysicsChecks]) -> str:
     names = dict.fromkeys(test.name for each in physics for test in each.excursions if not test.bounded)
     held = f"inputs held at {' and '.join(f'{level:g}' for level in levels)} times their recorded amplitude"
     return f"with a divergence at {' and at '.join([*([held] if levels else []), *names])}"
+
+
+def _describe_static(model: DynamicModel) -> str:
+    """State that a model is static; empty for another one."""
+    if not is_static(model):
+        return ""
+    return f"static: {model.output_name} depends on the inputs of the same sample only"
 
 
 def _describe_choice(
