@@ -13,9 +13,9 @@ The setting ``select`` can replace this rule by the paper's choice of Appendix A
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import inf, isfinite, isnan
 from typing import TypeAlias
+from weakref import WeakKeyDictionary
 
 from islands.models.narx import Model
 from islands.validation.assessment import Assessment
@@ -34,6 +34,11 @@ CHECKS = "physics-checks"
 
 #: A model of one or several outputs with its errors.
 Comparable: TypeAlias = Assessment | CoupledAssessment
+
+#: Noise of the errors of a model, and their square with the last noise: a front is compared again whenever a
+#: model is added to it.
+_NOISES: WeakKeyDictionary[object, ErrorNoise] = WeakKeyDictionary()
+_SQUARES: WeakKeyDictionary[object, tuple[ErrorNoise, float]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,15 +175,24 @@ def measure_squares(assessments: Sequence[Comparable]) -> tuple[list[float], int
     return [_measure_square(noise, entry) for entry in assessments], noise.samples
 
 
-# A front is compared again whenever a model is added to it.
-@lru_cache(maxsize=8)
 def _fit_noise(closest: Comparable) -> ErrorNoise:
-    return ErrorNoise.fit(closest.errors, closest.split.segments)
+    key = _identify(closest)
+    if key not in _NOISES:
+        _NOISES[key] = ErrorNoise.fit(closest.errors, closest.split.segments)
+    return _NOISES[key]
 
 
-@lru_cache(maxsize=256)
 def _measure_square(noise: ErrorNoise, entry: Comparable) -> float:
-    return noise.measure(entry.errors)
+    key = _identify(entry)
+    known = _SQUARES.get(key)
+    if known is None or known[0] is not noise:
+        known = _SQUARES[key] = noise, noise.measure(entry.errors)
+    return known[1]
+
+
+def _identify(entry: Comparable) -> object:
+    """Return an object that lives as long as the errors of a model."""
+    return entry.checks if isinstance(entry, Assessment) else entry
 
 
 def _take_simplest(
