@@ -27,7 +27,7 @@ LIMITS = {
     "jobs --help": (900, ""),
     "jobs show --url http://127.0.0.1:9": (850, ""),
     "show {model}": (610, ""),
-    "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1340, "numba scipy"),
+    "fit {record} --input u_V --output y_um --figures none --force --out {folder}": (1360, "numba scipy"),
     "simulate published:13 {record} --input u_V --output y_um": (1240, "numba scipy"),
     # Other processes draw the report.
     "diagnose {record} --input u_V --output y_um --rows 0:600 --simulation linear:1 --workers 2 --force "

@@ -50,8 +50,8 @@ def find_ratio(record: AwkwardRecord, folder: Path, least: float, test: Measurem
         names["output"],
     )
     if document["preprocessing"]["average"] == 1:
-        run = best.predict(data)
-        error = float(np.sqrt(np.mean((run - y)[WARM_UP:] ** 2)))
+        errors = (best.predict(data) - y)[max(WARM_UP, best.model.maximum_lag) :]
+        error = float(np.sqrt(np.mean(errors**2)))
     else:
         error = float(np.sqrt(best.simulate(data).mean_squared_error))
     return (error / (record.factor * least) if np.isfinite(error) else inf), ""

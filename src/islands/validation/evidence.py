@@ -21,7 +21,7 @@ from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.records.channel_names import parse_channel_name
 from islands.records.coupled import AnyRecord, CoupledRecord
-from islands.records.noise_model import NoiseModel, fit_noise
+from islands.records.noise_model import NoiseModel, fit_noise, white_noise
 from islands.records.segments import count_runs
 from islands.rounding import RESOLUTION
 from islands.simulation.predictors import Simulation
@@ -143,7 +143,7 @@ class ErrorNoise:
         columns = errors.reshape(len(errors), -1).T
         known = np.isfinite(columns)
         models = (
-            fit_noise(column[each], segments=count_runs(each, segments))
+            _fit_noise(column[each], count_runs(each, segments))
             for column, each in zip(columns, known, strict=True)
         )
         return cls(tuple(models), tuple(segments), int(np.count_nonzero(known)))
@@ -162,6 +162,14 @@ class ErrorNoise:
             whitened = noise.whiten(column[known], count_runs(known, self.segments))
             logarithms.append(log(float(np.mean(whitened**2)) + RESOLUTION**2))
         return float(np.exp(np.mean(logarithms)))
+
+
+def _fit_noise(errors: NDArray[np.float64], segments: Sequence[int]) -> NoiseModel:
+    """Fit the noise of errors; those below the resolution of files are white."""
+    square = float(np.mean(errors**2))
+    if square <= RESOLUTION**2:
+        return white_noise(square, errors.size)
+    return fit_noise(errors, segments=segments)
 
 
 def count_terms(models: Sequence[AnyModel]) -> int:

@@ -11,6 +11,7 @@ from islands.evolution.search_result import keep_best_of_sizes, rank_models
 from islands.models.latent import LatentModel
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
+from support.assessments import StatedChecks
 
 
 def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
@@ -48,12 +49,6 @@ def test_ties_are_broken_by_size_and_then_by_text():
     assert_ranked_in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))
 
 
-class Entry(SimpleNamespace):
-    """An assessment, which is compared by its identity."""
-
-    __hash__ = object.__hash__
-
-
 #: Errors of variance 1.
 WHITE = np.random.default_rng(0).choice([-1.0, 1.0], 200)
 
@@ -66,7 +61,7 @@ def test_the_most_evidence_of_every_size_is_kept_and_the_best_sound_model():
         holds = (SimpleNamespace(bounded=bounded),)
         physics = SimpleNamespace(holds=holds, excursions=(), property_1=False)
         errors, split = mean_square**0.5 * WHITE, SimpleNamespace(segments=())
-        return Entry(
+        return StatedChecks(
             model=model,
             mean_square=mean_square,
             metrics=metrics,

@@ -16,6 +16,7 @@ from islands.validation.metrics import Metrics
 from islands.validation.physics import ClusterSum, ExcursionTest, ExtremeTest, HoldTest, PhysicsChecks
 from islands.validation.recommendation import Exclusion
 from islands.validation.recommendation_reasons import list_rivals, state_fit, state_reasons
+from support.assessments import StatedChecks
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
 
@@ -27,12 +28,6 @@ WHITE = np.random.default_rng(1).choice([-1.0, 1.0], 1000)
 
 #: Samples of the estimation data of a `Candidate`.
 SAMPLES = 600
-
-
-class StatedChecks(SimpleNamespace):
-    """Checks of a model, which are compared by their identity."""
-
-    __hash__ = object.__hash__
 
 
 @dataclass(frozen=True)
