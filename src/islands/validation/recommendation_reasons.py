@@ -43,11 +43,11 @@ def state_reasons(
     """
     if found.reference is None:
         return ("the free run of every model diverges; this one has the least one-step-ahead error",)
-    reasons = (
+    choice = (
         _describe_static(assessments[found.rank - 1].model),
         _describe_choice(found, sizes, assessments, unit, accurate),
-        _describe_physics(found, assessments, hysteresis, unit),
     )
+    reasons = "; ".join(filter(None, choice)), _describe_physics(found, assessments, hysteresis, unit)
     return tuple(filter(None, reasons))
 
 
