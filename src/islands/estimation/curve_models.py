@@ -7,19 +7,19 @@ the first parameters that are estimated. The best curves are estimated further. 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from islands.estimation.fitted_state_space import Draft, FittedStateSpace, NewUnit
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front, fit_linear_systems, make_odd
+from islands.estimation.model_cache import share_models
 from islands.models.latent import LatentModel
 from islands.models.unit_functions import FUNCTIONS, parse_unit
-from islands.parallel import map_over_record
+from islands.parallel import map_over_record, one_blas_thread
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
@@ -37,13 +37,7 @@ _ROUNDS = ((5, 5, 48), (0, 12, 16), (0, 40, 8))
 _GAIN = 0.15
 
 
-# The fits of all libraries of a record share its models with one curve.
-@lru_cache(maxsize=4)
-def _share_models(_record: Dataset) -> list[LatentModel]:
-    """Return the list of the models of a record, empty before they are identified."""
-    return []
-
-
+@share_models
 def identify_curve_models(record: Dataset, steps: Steps) -> list[LatentModel]:
     """Identify linear systems with one curve.
 
@@ -67,16 +61,14 @@ def identify_curve_models(record: Dataset, steps: Steps) -> list[LatentModel]:
     StoppedError
         A stop is requested.
     """
-    shared = _share_models(record)
-    if not shared:
-        data = make_latent_data(record)
-        linear = fit_linear_systems(record, data, steps)
-        front = find_front([*linear, *add_curves(linear, data, steps=steps)], _GAIN)
-        direct = all(parse_channel_name(name).at_once for name in record.input_names)
-        shared += estimate_models([each for each in front if each.units], record, steps, direct=direct)
-    return shared
+    data = make_latent_data(record)
+    linear = fit_linear_systems(record, data, steps)
+    front = find_front([*linear, *add_curves(linear, data, steps=steps)], _GAIN)
+    direct = all(parse_channel_name(name).at_once for name in record.input_names)
+    return estimate_models([each for each in front if each.units], record, steps, direct=direct)
 
 
+@one_blas_thread
 def add_curves(
     linear: Sequence[FittedStateSpace], data: LatentData, structure: str = "auto", *, steps: Steps
 ) -> list[FittedStateSpace]:
@@ -110,9 +102,8 @@ def add_curves(
 
     for effect_steps, all_steps, kept in _ROUNDS:
         steps.report(f"{len(drafts)} linear models with one curve", None)
-        with threadpool_limits(1, user_api="blas"):
-            tried = map_over_record(partial(estimate, effect_steps, all_steps), drafts, rows)
-            found = sorted(filter(None, tried), key=lambda each: (each.fitness, each.key, each.theta))[:kept]
+        tried = map_over_record(partial(estimate, effect_steps, all_steps), drafts, rows)
+        found = sorted(filter(None, tried), key=lambda each: (each.fitness, each.key, each.theta))[:kept]
         drafts = [each.draft() for each in found]
     return found
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from islands.estimation.latent_data import LARGEST_MEMORY, SignalScales
 from islands.estimation.linear.frequency_response import estimate_response
@@ -28,6 +27,7 @@ from islands.estimation.linear.spectral_fit import (
 from islands.kernels.linear_filter import divide_rows
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel, StateSpaceLayout
+from islands.parallel import one_blas_thread
 from islands.progress import Steps
 from islands.records.coupled import CoupledRecord
 from islands.records.dataset import Dataset
@@ -69,6 +69,7 @@ class SharedModel:
     draws: Signal
 
 
+@one_blas_thread
 def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list[SharedModel]:
     """Search state spaces whose states all outputs share.
 
@@ -93,21 +94,19 @@ def search_shared_models(record: CoupledRecord, seed: int, steps: Steps) -> list
         [scale.scale_outputs(each.y) for scale, each in zip(scales, record.records, strict=True)]
     )
     steps.report("linear state space with shared states", 0.0)
-    # The sums of a matrix product depend on the number of threads of the library.
-    with threadpool_limits(1, user_api="blas"):
-        data, mean, unit = _measure_responses(record, u, y)
-        system = fit_shared_system(data, _LARGEST_ORDER) if data else None
-        if system is None or not system.order:
-            return []
-        equal = np.mean([each.response.variances for each in data], axis=0)
-        alike = [replace(each, response=replace(each.response, variances=equal)) for each in data]
-        linear = refine(system, alike) if len(data) > 1 else system
-        signals = _Signals(record, scales, u)
-        found = [_make_model(linear, alike, None, signals, seed)]
-        if len(data) > 1 and not steps.skip("effect of the amplitude"):
-            steps.report("effect of the amplitude on the state space", 0.3)
-            amplitude = _Amplitude(mean, unit, _find_forgetting(u, record))
-            found.append(_make_model(schedule(system, data, seed), data, amplitude, signals, seed))
+    data, mean, unit = _measure_responses(record, u, y)
+    system = fit_shared_system(data, _LARGEST_ORDER) if data else None
+    if system is None or not system.order:
+        return []
+    equal = np.mean([each.response.variances for each in data], axis=0)
+    alike = [replace(each, response=replace(each.response, variances=equal)) for each in data]
+    linear = refine(system, alike) if len(data) > 1 else system
+    signals = _Signals(record, scales, u)
+    found = [_make_model(linear, alike, None, signals, seed)]
+    if len(data) > 1 and not steps.skip("effect of the amplitude"):
+        steps.report("effect of the amplitude on the state space", 0.3)
+        amplitude = _Amplitude(mean, unit, _find_forgetting(u, record))
+        found.append(_make_model(schedule(system, data, seed), data, amplitude, signals, seed))
     return found
 
 

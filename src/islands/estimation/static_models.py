@@ -6,7 +6,6 @@ of their own, equations products.
 """
 
 from collections.abc import Iterator
-from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from islands.estimation.fitted_state_space import Draft, FittedStateSpace
 from islands.estimation.forward_selection import find_simplest, make_selection_problem, select_forward
 from islands.estimation.latent_data import LatentData, make_latent_data
 from islands.estimation.latent_models import estimate_models, find_front
+from islands.estimation.model_cache import share_models
 from islands.estimation.structure_selection.certificate import SubsetSearch
 from islands.estimation.structure_selection.deviations import find_offsets
 from islands.estimation.structure_selection.input_ranking import screen_candidates
@@ -41,13 +41,7 @@ _LIBRARY = "magnitude"
 _ONE = Constant(1.0)
 
 
-# The fits of all libraries of a record share its static models.
-@lru_cache(maxsize=4)
-def _share_models(_record: Dataset) -> list[LatentModel | Model]:
-    """Return the list of the models of a record, empty before they are identified."""
-    return []
-
-
+@share_models
 def identify_static_models(record: Dataset, steps: Steps) -> list[LatentModel | Model]:
     """Identify static models of increasing size.
 
@@ -71,18 +65,15 @@ def identify_static_models(record: Dataset, steps: Steps) -> list[LatentModel | 
     StoppedError
         A stop is requested.
     """
-    shared = _share_models(record)
-    if not shared:
-        data = make_latent_data(record)
-        found = [_begin(data).estimate(data)]
-        systems = [each for each in found if isinstance(each, FittedStateSpace)]
-        for curves in range(_TERMS):
-            best = find_front(systems)[-1:]
-            if any(len(each.units) < curves for each in best):
-                break  # The last curve gained nothing.
-            systems += add_curves(best, data, steps=steps)
-        shared += [*estimate_models(find_front(systems), record, steps), *_fit_equations(record)]
-    return shared
+    data = make_latent_data(record)
+    found = [_begin(data).estimate(data)]
+    systems = [each for each in found if isinstance(each, FittedStateSpace)]
+    for curves in range(_TERMS):
+        best = find_front(systems)[-1:]
+        if any(len(each.units) < curves for each in best):
+            break  # The last curve gained nothing.
+        systems += add_curves(best, data, steps=steps)
+    return [*estimate_models(find_front(systems), record, steps), *_fit_equations(record)]
 
 
 def _begin(data: LatentData) -> Draft:

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-from threadpoolctl import threadpool_limits
-
 from islands.diagnosis.planning.experiment_plan import DecisiveLimits, ExperimentPlan
 from islands.diagnosis.planning.experiment_plan import plan_experiment as plan_with_simulator
 from islands.diagnosis.procedure import diagnose as diagnose_simulator
@@ -16,7 +14,7 @@ from islands.errors import SettingsError
 from islands.facade.results.complete_diagnosis import DiagnosisResult
 from islands.models.narx import Model
 from islands.models.parametric import ParametricModel
-from islands.parallel import ParallelMap
+from islands.parallel import ParallelMap, one_blas_thread
 from islands.progress import ProgressCallback, ignore_progress
 from islands.records.dataset import Dataset
 from islands.records.reading.column_names import list_inputs
@@ -126,12 +124,10 @@ def diagnose(
         columns = {**(columns or {}), **dict(zip(recorded, record.u[:, kept:].T, strict=True))}
         record = record.first_inputs(kept)
     simulator = _as_simulator(simulation, record, columns)
-    # The matrices are small: several threads take twice the CPU time.
-    with threadpool_limits(1, user_api="blas"):
-        found = diagnose_simulator(
-            *(record, simulator, given.tolerance, seed, progress, parallel_map, effects),
-            noise_level=given.noise_level,
-        )
+    found = one_blas_thread(diagnose_simulator)(
+        *(record, simulator, given.tolerance, seed, progress, parallel_map, effects),
+        noise_level=given.noise_level,
+    )
     return DiagnosisResult.from_diagnosis(found)
 
 

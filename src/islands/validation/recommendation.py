@@ -126,17 +126,15 @@ def recommend(
     if hysteresis:
         selection.keep(PROPERTY_1, [at for at in bounded if assessments[at].physics.property_1])
     # A divergence that the record does not show needs a smaller error than that of every model without one.
-    is_bounded = [is_sound(assessments[at].physics, hysteresis) for at in selection.left]
-    first = is_bounded.index(True) if any(is_bounded) else len(is_bounded)
-    selection.keep(
-        CHECKS, [at for place, at in enumerate(selection.left) if is_bounded[place] or place < first]
-    )
+    sound = [at for at in selection.left if is_sound(assessments[at].physics, hysteresis)]
+    if sound:
+        selection.keep(CHECKS, [at for at in selection.left if at in sound or at < sound[0]])
     terms = count_terms([entry.model for entry in assessments])
     lack = _measure_lack(selection.left, sizes, assessments, terms)
     reference = min(selection.left, key=lambda at: (lack[at], at))
     limit = lack[reference] + DECISIVE
     selection.keep(EVIDENCE, [at for at in selection.left if lack[at] <= limit])
-    selection.keep(CHECKS, [at for at in selection.left if is_sound(assessments[at].physics, hysteresis)])
+    selection.keep(CHECKS, [at for at in selection.left if at in sound])
     chosen = (
         min(selection.left, key=lambda at: (lack[at], at))
         if accurate

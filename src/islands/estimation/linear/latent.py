@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from math import inf, isfinite, log, nan
 
 import numpy as np
@@ -13,6 +12,7 @@ from islands.estimation.linear.identify import identify_orders
 from islands.estimation.linear.model import LinearModel
 from islands.estimation.linear.sections import Signal
 from islands.estimation.modal_form import find_modal_form
+from islands.estimation.model_cache import share_models
 from islands.kernels.state_space import simulate_states
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.latent import LatentModel, StateSpaceLayout
@@ -27,13 +27,6 @@ _SAMPLES_PER_STATE, _LARGEST_MEMORY, _LARGEST_PART = 3, 100, 0.05
 
 #: Part to which a mode decays in these samples.
 _DECAY = 0.01
-
-
-# The fits of all libraries of a record share its linear models.
-@lru_cache(maxsize=4)
-def _share_models(_record: Dataset) -> list[LatentModel]:
-    """Return the list of the linear models of a record, empty before they are identified."""
-    return []
 
 
 def identify_linear_model(record: Dataset, steps: Steps | None = None) -> LatentModel:
@@ -62,15 +55,13 @@ def identify_linear_model(record: Dataset, steps: Steps | None = None) -> Latent
     return identify_linear_models(record, steps)[0]
 
 
+@share_models
 def identify_linear_models(record: Dataset, steps: Steps | None = None) -> list[LatentModel]:
     """Identify the linear model of a record, and the best ones of other orders after it.
 
     Parameters and errors are those of `identify_linear_model`.
     """
-    shared = _share_models(record)
-    if not shared:
-        shared += [model for (model,) in _identify([record], steps)]
-    return shared
+    return [model for (model,) in _identify([record], steps)]
 
 
 def identify_joint_model(record: CoupledRecord, steps: Steps | None = None) -> CoupledLatentModel:

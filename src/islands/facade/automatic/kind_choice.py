@@ -17,7 +17,6 @@ from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent
 from islands.facade.fit_settings import FitSettings
 from islands.facade.front import Front, StoppedFitError, find_linear_result, list_simple
 from islands.facade.library_fit import LibraryFit, fit_library
-from islands.facade.trials.feedthrough_selection import advance_split
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData, prepare_data
 from islands.facade.trials.static_selection import STATIC, find_static
@@ -88,8 +87,8 @@ def choose_kind(
     """
     libraries = _drop_repeated(libraries)
     # Models of hysteresis keep a property that no simple model has.
-    smooth = [each for each in libraries.values() if not constraint(each.constraints).sums]
-    linear = find_linear_result(record, split, smooth[0], settings, seed, steps) if smooth else None
+    free = [each for each in libraries.values() if not _is_constrained(each)]
+    linear = find_linear_result(record, split, free[0], settings, seed, steps) if free else None
     try:
         return _choose_kind(record, split, libraries, settings, least, seed, steps)
     except StoppedFitError:
@@ -122,13 +121,12 @@ def _choose_kind(
     first = late[min(promising, key=trials.errors.__getitem__)]
     data = _find_static_data(split, settings, first, steps)
     data = data or prepare_data(split, settings.average, settings.feedthrough, first, least, steps)
-    smooth = [each for each in late.values() if not constraint(each.constraints).sums]
-    simple = list_simple(data, smooth[0], settings, steps) if smooth else []
+    free = [kind for kind, library in late.items() if not _is_constrained(library)]
+    simple = list_simple(data, late[free[0]], settings, steps) if free else []
     fits = _KindFits(record, data, simple, settings, seed, steps)
     fits.add({kind: late[kind] for kind in promising})
-    others = [kind for kind in libraries if not constraint(libraries[kind].constraints).sums]
-    if _find_least(simple) < _find_least(fits.bounded.values()) and not fits.known.intersection(others):
-        rival = min(others, key=trials.errors.__getitem__)
+    if _find_least(simple) < _find_least(fits.bounded.values()) and not fits.known.intersection(free):
+        rival = min(free, key=trials.errors.__getitem__)
         fits.add({rival: late[rival]})
     errors = fits.measure_errors()
     kind, reason = _select_kind(data.split.estimation, libraries, trials, fits.bounded, errors, simple)
@@ -156,8 +154,12 @@ def _find_static_data(
     chosen = settings.average, settings.feedthrough, settings.delays
     if chosen != (AUTO_AVERAGE, AUTO_FEEDTHROUGH, None):
         return None
-    places = steps.attempt(STATIC, partial(find_static, split, library, steps))
-    return PreparedData(advance_split(split, places), 1, places) if places else None
+    return steps.attempt(STATIC, partial(find_static, split, library, steps))
+
+
+def _is_constrained(library: TrialLibrary) -> bool:
+    """Return whether the models of a library are those of hysteresis."""
+    return bool(constraint(library.constraints).sums)
 
 
 def _describe_delays(trials: KindTrials, settings: FitSettings, steps: Steps) -> str:
@@ -312,7 +314,7 @@ def _select_kind(
             f"{percent(trials.errors[first])} of the output range of these data"
             f"{list_others(trials.errors, first)}"
         )
-    constrained = [each for each in compared if constraint(libraries[each].constraints).sums]
+    constrained = [each for each in compared if _is_constrained(libraries[each])]
     limit = _CLOSE**2 * _find_least([*compared.values(), *simple])
     close = [each for each in constrained if compared[each].mean_square <= limit]
     rests = bool(close) and check_rest(record).value

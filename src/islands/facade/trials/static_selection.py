@@ -8,6 +8,7 @@ from islands.errors import RecordError
 from islands.evolution.search_result import take_recommended
 from islands.facade.trials.feedthrough_selection import advance_split
 from islands.facade.trials.library import TrialLibrary
+from islands.facade.trials.prepared_data import PreparedData
 from islands.facade.trials.rate_selection import compute_errors
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
@@ -21,8 +22,8 @@ from islands.validation.simple_models import assess_curve_models, assess_linear_
 STATIC = "static models"
 
 
-def find_static(split: Split, library: TrialLibrary, steps: Steps) -> tuple[int, ...]:
-    """Return the places of the inputs that a static model needs one sample early; none of another record.
+def find_static(split: Split, library: TrialLibrary, steps: Steps) -> PreparedData | None:
+    """Return the data of a static record, whose inputs are read one sample early; None of another record.
 
     The static models compete with the linear one of the inputs as recorded, and with those with one curve, as
     in the front of a result. If one of them is recommended, small models of a library must not have clearly
@@ -46,22 +47,23 @@ def find_static(split: Split, library: TrialLibrary, steps: Steps) -> tuple[int,
     steps.report(STATIC, None)
     linear = assess_linear_model(split, 1, library.lags, steps=steps)
     warm_up = library.lags if linear is None else linear.warm_up
-    models = assess_static_models(advance_split(split, late), 1, warm_up, steps)
+    advanced = advance_split(split, late)
+    models = assess_static_models(advanced, 1, warm_up, steps)
     models += [linear] if linear else []
     # Curves take longer than the linear model, which shows most dynamics.
     if not _is_static(models) or not _is_static(
         [*models, *assess_curve_models(split, 1, warm_up, "none", steps)]
     ):
-        return ()
+        return None
     own = take_recommended(models).errors[-split.validation.samples :]
     try:
         other = compute_errors(split, library, 1) / split.estimation.output_range
     except RecordError:
-        return ()  # too short for the library: the search reports it
+        return None  # too short for the library: the search reports it
     closest = min(own, other, key=lambda each: float(np.nanmean(each**2)))
     noise = ErrorNoise.fit(closest, split.validation.segments)
     gain = log(noise.measure(own)) - log(noise.measure(other))
-    return late if noise.samples * gain <= DECISIVE else ()
+    return PreparedData(advanced, 1, late) if noise.samples * gain <= DECISIVE else None
 
 
 def _is_static(models: list[Assessment]) -> bool:

@@ -43,7 +43,8 @@ def drive(excite, seed):
 )
 def test_inputs_are_read_at_the_same_sample_if_a_static_model_has_as_much_evidence(excite, respond, places):
     data = split(measure(drive(excite, 0), respond))
-    assert find_static(data, take_library("polynomial", None, None, None), Steps()) == places
+    found = find_static(data, take_library("polynomial", None, None, None), Steps())
+    assert (found.early if found else ()) == places
 
 
 @pytest.mark.ci
