@@ -129,8 +129,8 @@ class Settings:
     population: Integer = setting(500, "Offspring of each generation: individuals of an island.", ge=1)
     effort: str = setting(
         "normal",
-        "Generations by default: `quick` none, so that the models of the fits compete alone; `normal` those "
-        "of the preset; `deep` five times as many.",
+        "Length of the search, unless `generations` are given: `quick` compares the models of fits, `normal` "
+        "evolves as long as the preset says, `deep` five times as long.",
         choices=EFFORTS,
         daily=True,
     )
