@@ -129,7 +129,7 @@ def fit_record(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-    on_front: ResultCallback = ignore_result,
+    on_front: ResultCallback | None = None,
     on_models: ResultCallback = ignore_result,
     equations_only: bool = False,
     **changes: Any,
@@ -142,7 +142,7 @@ def fit_record(
     validation : Dataset, CoupledRecord or float
     refine_together, seed, progress, stop, **changes
         As for `fit`.
-    on_front : callable
+    on_front : callable, optional
         Called with the models of one output so far, whenever some are added.
     on_models : callable
         Called with the ranked models of each output, before the optional steps.

@@ -164,7 +164,7 @@ def identify_record(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
-    on_front: ResultCallback = ignore_result,
+    on_front: ResultCallback | None = None,
     on_models: ResultCallback = ignore_result,
     equations_only: bool = False,
     **changes: Any,
@@ -177,7 +177,7 @@ def identify_record(
     validation : Dataset, CoupledRecord or float
     refine_together, preset, seed, progress, on_epoch, stop, start, engine, **changes
         As for `identify`.
-    on_front : callable
+    on_front : callable, optional
         Called with the models of one output so far, whenever fits of the preset ``auto`` add some.
     on_models : callable
         Called with the ranked models of each output, before the optional steps.

@@ -50,7 +50,7 @@ def choose_kind(
     least: int,
     seed: int,
     steps: Steps,
-    on_front: ResultCallback,
+    on_front: ResultCallback | None,
 ) -> tuple[Choice, Front | None]:
     """Choose the kind of a record.
 
@@ -75,7 +75,7 @@ def choose_kind(
     seed : int
         Stored in the results.
     steps : Steps
-    on_front : callable
+    on_front : callable, optional
         Called with the result of all models so far: of the linear model, and after every fit.
 
     Raises
@@ -92,7 +92,7 @@ def choose_kind(
     # Models of hysteresis keep a property that no simple model has.
     free = [each for each in libraries.values() if not _is_constrained(each)]
     linear = find_linear_result(record, split, free[0], settings, seed, steps) if free else None
-    if linear is not None:
+    if linear and on_front:
         on_front(linear)
     try:
         return _choose_kind(record, split, libraries, settings, least, seed, steps, on_front)
@@ -112,7 +112,7 @@ def _choose_kind(
     least: int,
     seed: int,
     steps: Steps,
-    on_front: ResultCallback,
+    on_front: ResultCallback | None,
 ) -> tuple[Choice, Front | None]:
     """Choose the kind of a record; see `choose_kind`."""
     estimation = split.estimation
@@ -189,7 +189,7 @@ class _KindFits:
     settings : FitSettings
     seed : int
     steps : Steps
-    on_front : callable
+    on_front : callable, optional
         Called with the result of all models after every fit.
     """
 
@@ -201,7 +201,7 @@ class _KindFits:
         settings: FitSettings,
         seed: int,
         steps: Steps,
-        on_front: ResultCallback,
+        on_front: ResultCallback | None,
     ) -> None:
         self._record, self._data, self._simple = record, data, tuple(simple)
         self._settings, self._seed, self._steps = settings, seed, steps
@@ -238,7 +238,8 @@ class _KindFits:
                 self._fits[name] = fit
                 if self._steps.left_out:
                     raise StoppedError(step)
-                self._steps.call(self._on_front, self._take_found())
+                if self._on_front:
+                    self._steps.call(self._on_front, self._take_found())
             except StoppedError as stopped:
                 if not self._fits:
                     raise

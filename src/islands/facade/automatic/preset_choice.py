@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import AUTO, accepts_fits, resolve_kinds, resolve_latent, with_tuples
-from islands.evolution.search_result import ResultCallback, ignore_result
+from islands.evolution.search_result import ResultCallback
 from islands.facade.automatic.choice import Choice, keep_models
 from islands.facade.automatic.kind_choice import choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
@@ -36,7 +36,7 @@ def choose_preset(
     changes: Mapping[str, Any],
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
-    on_front: ResultCallback = ignore_result,
+    on_front: ResultCallback | None = None,
 ) -> Choice:
     """Choose the kind of record and the dead times of the preset ``auto`` for ``identify``.
 
@@ -51,7 +51,7 @@ def choose_preset(
         Called with a message and the completed fraction.
     stop : callable, optional
         Called between all steps.
-    on_front : callable
+    on_front : callable, optional
         Called with the result of all models so far; see `choose_kind`.
 
     Raises
@@ -93,7 +93,7 @@ def fit_chosen_library(
     seed: int,
     progress: ProgressCallback,
     stop: Stop,
-    on_front: ResultCallback = ignore_result,
+    on_front: ResultCallback | None = None,
     equations_only: bool = False,
 ) -> Front:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
@@ -116,7 +116,7 @@ def fit_chosen_library(
         if equations_only:
             return fit_one(library)
         linear = find_linear_result(record, split, library, settings, seed, steps)
-        if linear is not None:
+        if linear and on_front:
             on_front(linear)
         try:
             return fit_one(library)
