@@ -44,7 +44,7 @@ def test_the_curve_of_a_sensor_is_found_in_any_order_of_its_samples(name):
 
 
 def test_the_flow_through_a_valve_is_a_product():
-    u = np.random.default_rng(0).uniform([0.1, 0.5], [1.0, 6.0], (400, 2))
+    u = np.random.default_rng(0).uniform([0.1, 0.5], [1.0, 6.0], (100, 2))
     record, noise = measure(lambda u: 8.0 * u[:, 0] * np.sqrt(u[:, 1]), u, 1)
     models = identify_static_models(record, Steps())
     first = next(each for each in models if each.kind == "narx")
