@@ -70,7 +70,7 @@ def test_an_extrapolating_validation_is_a_warning_before_the_fit() -> None:
         warnings.simplefilter("error")
         within = Dataset(0.9 * data.u[:100], data.y[:100], data.dt)
         settings = {"library": "polynomial", "degree": 1, "lags": 1, "certificate": 0, "average": 1}
-        islands.fit(data, validation=within, **settings)
+        islands.fit(data, validation=within, estimator="shooting", **settings)
 
 
 def test_model_simulates_a_record_in_three_modes(result):
