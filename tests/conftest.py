@@ -68,6 +68,7 @@ def pytest_collection():
     try:
         return (yield)
     finally:
+        gc.freeze()  # a collection does not visit what is frozen
         freeze_garbage_collector()
         gc.enable()
 
