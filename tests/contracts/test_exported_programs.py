@@ -19,11 +19,7 @@ STARTS = {"from a record": start_from_record, "by default": start_by_default}
 #: Starts of models whose kernels are compiled at their first use.
 _COMPILED = {
     "own primitive": [*STARTS],
-    **{
-        name: ["from a record"]
-        for name in OF_BLOCKS
-        if name.startswith(("state space", "shared states", "integrator"))
-    },
+    **{name: ["from a record"] for name in OF_BLOCKS if name.startswith(("state space", "integrator"))},
 }
 
 #: Models of which every format is run for every change. The programs of the others are in C and Python, whose

@@ -274,7 +274,7 @@ def _estimate_shared_states(
     outputs = [
         (
             each.theta,
-            record.y[begin + late : end],
+            record.y[begin + late : end].copy(),  # may be written, as in the calls that the archive has code for
             each.limits.range,
             float(each.matrices["C"] @ each.matrices["C"]),
         )
