@@ -39,9 +39,9 @@ unexport PYTHONDONTWRITEBYTECODE
 collect: .venv/ready-test
 	$(BIN)/pytest --collect-only -q >/dev/null
 
-# Three workers on two cores: some tests wait for other processes.
+# As many workers as cores: another one would use the time in which tests wait, and collect all tests once more.
 test: .venv/ready-test .venv/ready-lint .venv/ready-docs
-	$(PYTEST) -n 3
+	$(PYTEST) -n 2
 
 # What CI runs besides `make test`: browser, PostgreSQL, kills of a coordinator and of an island. More of these tests
 # wait: for processes, pages and databases. The tests of the wheel need one, which .ci/run builds first.

@@ -48,9 +48,12 @@ def pytest_configure(config):
     # Before the workers start: each of them would compile all kernels for itself.
     if not hasattr(config, "workerinput"):
         from islands.facade.warm_up import warm_up
+        from islands.kernels.jit_cache import is_current, read_manifest
 
         warm_up()
-        if config.getoption("numprocesses", None):
+        archive = read_manifest()
+        is_archived = archive is not None and all(map(is_current, archive.imports))
+        if config.getoption("numprocesses", None) and not is_archived:
             from support.kernels import compile_further_kernels
 
             compile_further_kernels()
@@ -65,6 +68,7 @@ def pytest_collection():
     try:
         return (yield)
     finally:
+        gc.freeze()  # a collection does not visit what is frozen
         freeze_garbage_collector()
         gc.enable()
 

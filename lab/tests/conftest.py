@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parent
+FOLDER = str(Path(__file__).parent)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     for item in items:
-        if FOLDER in item.path.parents and item.path.name not in ("test_smoke.py", "test_imports.py"):
+        if str(item.path).startswith(FOLDER) and item.path.name not in ("test_smoke.py", "test_imports.py"):
             item.add_marker("nightly")

@@ -4,6 +4,7 @@ import gc
 import os
 import resource
 from contextlib import suppress
+from functools import cache
 
 #: Environment variables that set the number of threads of numerical libraries.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -26,6 +27,7 @@ def limit_threads() -> None:
         os.environ.setdefault(name, "1")
 
 
+@cache
 def freeze_garbage_collector() -> None:
     """Exclude all present objects of this process from garbage collection, and collect less often.
 
@@ -34,10 +36,9 @@ def freeze_garbage_collector() -> None:
     0007), and delays every request of a web server by some hundredths of a second. Results do not depend on
     it.
     """
-    if gc.get_freeze_count() == 0:
-        gc.collect()
-        gc.freeze()
-        gc.set_threshold(*_GC_THRESHOLDS)
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*_GC_THRESHOLDS)
 
 
 def raise_file_limit() -> None:

@@ -21,6 +21,8 @@ SOURCES = sorted(
 
 def reads(text):
     """Return the lines in which a module reads the environment, for any alias of `os`."""
+    if not any(name in text for name in NAMES):
+        return []
     tree = ast.parse(text)
     written = {id(node) for statement in ast.walk(tree) for node in _write_targets(statement)}
     return sorted(node.lineno for node in ast.walk(tree) if _is_environment(node) and id(node) not in written)

@@ -230,6 +230,7 @@ def test_errors_of_a_problem_are_raised_unchanged(engine, search_problem):
 
 
 @separate_actors(pytest.mark.ci)
+@pytest.mark.ci  # compiles the primitive
 def test_search_with_a_primitive_of_the_user_equals_that_of_the_serial_engine(engine):
     # The workers of Ray cannot import the module of this function.
     data = own_primitive.record()

@@ -16,12 +16,6 @@ TEXTS = {"plain", "latex", "mathml", "json"}
 
 STARTS = {"from a record": start_from_record, "by default": start_by_default}
 
-#: Starts of models whose kernels are compiled at their first use.
-_COMPILED = {
-    "own primitive": [*STARTS],
-    **{name: ["from a record"] for name in OF_BLOCKS if name.startswith(("state space", "integrator"))},
-}
-
 #: Models of which every format is run for every change. The programs of the others are in C and Python, whose
 #: equations the further formats have; those are run at night.
 _ESSENTIAL = ("own primitive", "deviations at once", "two masses", "state space")
@@ -37,8 +31,7 @@ def _list_cells():
         for start in STARTS:
             if (kind, name) == ("modelica", "own primitive"):  # refused
                 continue
-            marks = [pytest.mark.ci] if start in _COMPILED.get(name, ()) else []
-            yield pytest.param(build, name, [start], marks=marks, id=f"{kind}, {name}, {start}")
+            yield pytest.param(build, name, [start], id=f"{kind}, {name}, {start}")
 
 
 @pytest.mark.parametrize(("build", "name", "starts"), [*_list_cells()])

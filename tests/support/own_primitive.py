@@ -25,6 +25,7 @@ SEARCH = {
     "max_terms": 2,
     "max_height": 2,
     "shooting": 50,
+    "estimator": "shooting",
 }
 
 #: The law of the record.

@@ -271,10 +271,11 @@ def _estimate_shared_states(
     first = model.models[0]
     u, late = read_inputs(records[0], first, begin, end)
     rest, order, units = first.rest, first.order, len(first.units)
+    # Outputs that can be written, as in all other calls of the kernel: it is compiled for each type.
     outputs = [
         (
             each.theta,
-            record.y[begin + late : end],
+            record.y[begin + late : end].copy(),
             each.limits.range,
             float(each.matrices["C"] @ each.matrices["C"]),
         )

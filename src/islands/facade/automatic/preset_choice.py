@@ -16,6 +16,7 @@ from islands.facade.front import Front, StoppedFitError, find_linear_result, lis
 from islands.facade.library_fit import fit_library
 from islands.facade.trials.library import TrialLibrary, make_trial_library, take_library
 from islands.facade.trials.prepared_data import prepare_data
+from islands.models.candidate_library import count_inputs
 from islands.progress import ProgressCallback, Steps, Stop, StoppedError, ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import Split, split_data
@@ -113,6 +114,9 @@ def fit_chosen_library(
     fit_one = partial(_fit_one, record, split, settings, seed, steps, equations_only)
     if settings.library != AUTO:
         library = take_library(settings.library, degree, lags, constraints, settings.delays or ())
+        count_inputs(
+            library.name, library.degree, library.lags, record.inputs
+        )  # refuses one that is too large
         if equations_only:
             return fit_one(library)
         linear = find_linear_result(record, split, library, settings, seed, steps)

@@ -43,7 +43,10 @@ def run(command_line):
     return command_line
 
 
-FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")
+FIT = (
+    *("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--out", "out"),
+    *("--library", "phi-polynomial", "--max-terms", "3"),
+)
 
 
 @pytest.fixture(scope="module")

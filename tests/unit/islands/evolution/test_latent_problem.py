@@ -15,7 +15,7 @@ SETTINGS = resolve_settings("latent", {"population": 6, "generations": 4, "migra
 
 @pytest.fixture(scope="module")
 def problem():
-    return make_latent_problem(spring_record(240, noise=0.02), SETTINGS, Steps())
+    return make_latent_problem(spring_record(120, noise=0.02), SETTINGS, Steps())
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def check_law(made):
 
 def test_several_recordings_are_fitted_together():
     parts = tuple(tank(samples, seed) for seed, samples in enumerate((100, 3, 160, 2, 140)))
-    made = islands.fit(join(parts), library="polynomial", max_terms=4)
+    made = islands.fit(join(parts), library="polynomial", max_terms=4, estimator="shooting")
     assert made.search_result.record.segments == (100, 3, 160, 2, 140)
     assert made.search_result.split.estimation.segments == (75, 2, 120, 2, 105)
     assert list(made.search_result.recommended.recordings["validation"]) == ["1", "2", "3", "5"]

@@ -12,14 +12,14 @@ FRICTION = {"y(k-1)": 0.98, "u1(k-1)": 0.1, "sign(y(k-1))": -0.03}
 SETTINGS = {"library": "friction", "lags": 2, "degree": 2, "average": 1, "certificate": 0, "max_terms": 6}
 
 
-def drive(seed, output_noise=0.0, equation_noise=0.0):
+def drive(seed, output_noise=0.0, equation_noise=0.0, samples=1500):
     rng = np.random.default_rng(seed)
-    u, y = np.repeat(rng.uniform(-1.0, 1.0, 100), 15), np.zeros(1500)
-    for k in range(1, 1500):
+    u, y = np.repeat(rng.uniform(-1.0, 1.0, samples // 15), 15), np.zeros(samples)
+    for k in range(1, samples):
         parts = FRICTION.values()
         terms = y[k - 1], u[k - 1], np.sign(y[k - 1])
         y[k] = np.dot(list(parts), terms) + equation_noise * rng.standard_normal()
-    return Dataset(u, y + output_noise * rng.standard_normal(1500), 0.01)
+    return Dataset(u, y + output_noise * rng.standard_normal(samples), 0.01)
 
 
 @pytest.mark.ci
@@ -42,8 +42,7 @@ def test_a_stop_leaves_the_refinement_out():
     def stop():
         return "estimation by the error of the free run" in stages
 
-    found = islands.fit(
-        drive(0, output_noise=0.03), **SETTINGS, progress=lambda stage, _: stages.append(stage), stop=stop
-    )
+    record = drive(0, output_noise=0.03, samples=300)
+    found = islands.fit(record, **SETTINGS, progress=lambda stage, _: stages.append(stage), stop=stop)
     assert "estimation by the error of the free run" in found.left_out
     assert found.best.model.parameters

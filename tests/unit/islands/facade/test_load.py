@@ -147,7 +147,7 @@ def test_a_folder_of_something_else_lists_the_kinds(tmp_path):
 
 def test_a_damaged_model_names_the_field(base, tmp_path):
     search = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 2, "certificate": 0, "average": 1}
-    islands.fit(read(base), **search).save(tmp_path / "result", figures=())
+    islands.fit(read(base), estimator="shooting", **search).save(tmp_path / "result", figures=())
     file = tmp_path / "result" / "models" / "01.json"
     file.write_text(json.dumps(json.loads(file.read_text()) | {"inputs": []}))
     with pytest.raises(islands.ModelError, match="inputs"):

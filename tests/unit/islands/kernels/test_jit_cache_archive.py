@@ -18,12 +18,15 @@ USE = """
 from islands.facade.warm_up import use_other_kernels, warm_up
 from islands.kernels.jit_cache import cache_folder
 from islands_service.intake.simulation_server import compile_kernels
+from support.block_cases import OF_BLOCKS, start_from_record
 from support.kernels import compile_further_kernels
 
 assert not warm_up(print)
 use_other_kernels()
 compile_further_kernels()
 compile_kernels()
+for name in OF_BLOCKS:
+    start_from_record(name)
 print(*sorted(path.name for path in cache_folder().rglob("*.nbc")))
 """
 
@@ -89,7 +92,7 @@ def test_other_processors_and_versions_use_other_code(monkeypatch: pytest.Monkey
 
 @needs_archive
 @pytest.mark.ci
-def test_no_command_compiles_a_kernel(tmp_path) -> None:
+def test_no_command_and_no_simulation_compiles_a_kernel(tmp_path) -> None:
     environment = {name: text for name, text in os.environ.items() if not name.startswith("NUMBA_")}
     environment |= {"ISLANDS_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT / "tests")}
     done = subprocess.run(

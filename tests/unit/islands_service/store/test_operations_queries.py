@@ -2,6 +2,7 @@
 
 import json
 import random
+import shutil
 
 import pytest
 from sqlalchemy import event, insert, text, update
@@ -74,11 +75,20 @@ def full(store):
     return filled(store)
 
 
+@pytest.fixture(scope="module")
+def filled_file(prepared_sqlite, tmp_path_factory):
+    """A file with the same jobs, to be copied."""
+    path = shutil.copyfile(prepared_sqlite, tmp_path_factory.mktemp("store") / "filled.db")
+    with Store(f"sqlite:///{path}") as store:
+        filled(store)
+    return path
+
+
 @pytest.fixture
-def sqlite(sqlite_database):
+def sqlite(filled_file, tmp_path):
     """The same in SQLite only, which chooses its plans without statistics."""
-    with Store(sqlite_database) as store:
-        yield filled(store)
+    with Store(f"sqlite:///{shutil.copyfile(filled_file, tmp_path / 'islands.db')}") as store:
+        yield store
 
 
 def plans(store, ask):

@@ -111,7 +111,8 @@ def test_combined_certificates_hold_for_both_libraries():
 
 
 def test_fit_reports_the_gap_of_every_model():
-    found = islands.fit(measured(), library="polynomial", degree=2, lags=LAGS, max_terms=3)
+    settings = {"degree": 2, "lags": LAGS, "max_terms": 3, "estimator": "shooting"}
+    found = islands.fit(measured(), library="polynomial", **settings)
     document = result_document(found.search_result)["search"]["certificates"]
     assert [entry["terms"] for entry in document] == [1, 2, 3]
     errors = {entry.model.size: entry.metrics["estimation"]["one_step_ahead"].rmse for entry in found.models}

@@ -17,7 +17,7 @@ def test_words_of_a_language_and_signs_are_replaced():
     ]
 
 
-@given(st.lists(st.text(max_size=80), max_size=12, unique=True))
+@given(st.lists(st.text(max_size=80), max_size=4, unique=True))
 def test_identifiers_are_valid_and_unique(names):
     found = make_identifiers(names)
     assert list(found) == names

@@ -129,6 +129,7 @@ def test_the_reason_for_a_kind_names_a_better_one_that_is_left_out():
     assert "left out" not in reason
 
 
+@pytest.mark.ci
 def test_a_level_that_integrates_is_not_taken_for_hysteresis():
     """It rests at the balance of its inputs, and a constant is the best trial of the last samples."""
     pump = np.ones(400)

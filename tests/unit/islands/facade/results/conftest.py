@@ -9,7 +9,7 @@ from support.undrawn import undrawn_figures
 
 @pytest.fixture(scope="session")
 def result():
-    return islands.fit(record(400), library="polynomial", degree=1, max_terms=4)
+    return islands.fit(record(200), library="polynomial", degree=1, max_terms=4, estimator="shooting")
 
 
 @pytest.fixture(scope="session")

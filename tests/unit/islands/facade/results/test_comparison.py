@@ -11,7 +11,7 @@ pytestmark = pytest.mark.ci
 
 @pytest.fixture(scope="module")
 def small():
-    return islands.fit(record(400), library="polynomial", degree=1, max_terms=1)
+    return islands.fit(record(200), library="polynomial", degree=1, max_terms=1, estimator="shooting")
 
 
 def test_a_comparison_has_one_row_per_result(result, small):

@@ -23,10 +23,10 @@ def test_a_result_without_a_loop_replaces_the_loop_figure_of_an_earlier_one(resu
 
 
 def test_predictions_of_a_frame_have_one_value_per_row(result):
-    data = record(400)
+    data = record(200)
     frame = pd.DataFrame({"u": data.u[:, 0], "y": data.y})
     predicted = result.predict(frame)
-    assert predicted.shape == (400,)
+    assert predicted.shape == (200,)
     lag = result.best.model.maximum_lag
     assert np.array_equal(predicted, result.best.simulate(data, warm_up=lag).y, equal_nan=True)
     # The free run reads only the first samples of the output.

@@ -131,6 +131,7 @@ def test_the_setting_decides_without_a_test():
 
 def test_identify_finds_it_likewise():
     changes = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 1, "max_height": 1}
-    found = islands.identify(lag(white(0), 0), preset="narx", shifts=(1,), average=1, **changes)
+    record = lag(white(0, 400), 0)
+    found = islands.identify(record, preset="narx", estimator="shooting", shifts=(1,), average=1, **changes)
     assert found.search_result.direct_inputs == ("u_V",)
     assert "u_V(k)" in found.best.equation

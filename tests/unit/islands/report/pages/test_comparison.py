@@ -23,7 +23,7 @@ def document():
     data = record(300)
     named = Dataset(data.u, data.y, 0.01, ("u_V",), "y_um", ("V",), "um")
     settings = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 2, "certificate": 0}
-    return result_document(islands.fit(named, average=1, **settings).search_result)
+    return result_document(islands.fit(named, average=1, estimator="shooting", **settings).search_result)
 
 
 def compared(document, rank=1, name="first", run=RUN, **request):

@@ -18,7 +18,15 @@ FIGURES = {
 def found():
     data = record(300)
     named = Dataset(data.u, data.y, 0.01, ("u_V",), "y_um", ("V",), "um")
-    return islands.fit(named, library="polynomial", degree=1, lags=1, max_terms=2, certificate=0, average=1)
+    settings = {
+        "library": "polynomial",
+        "degree": 1,
+        "lags": 1,
+        "max_terms": 2,
+        "certificate": 0,
+        "average": 1,
+    }
+    return islands.fit(named, estimator="shooting", **settings)
 
 
 def write(found, figures=FIGURES, **changes):
