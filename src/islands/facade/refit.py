@@ -20,9 +20,10 @@ from islands.parallel import map_over_record
 from islands.progress import Steps
 from islands.records.averaging import average_samples
 from islands.records.compatibility import ColumnReference, match_record
-from islands.records.dataset import Dataset, join
+from islands.records.dataset import Dataset
 from islands.records.missing_outputs import skip_missing_outputs
 from islands.records.signal_map import map_signals
+from islands.records.split import Split, join_parts
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, with_refit
@@ -101,11 +102,7 @@ def join_data(record: Dataset, validation: Dataset | float) -> Dataset:
         return skip_missing_outputs(record)
     columns = ColumnReference(record.input_names, record.output_name, record.dt, 1, record.preprocessing)
     matched, _ = map_signals(columns, validation)
-    names = {
-        name: getattr(record, name)
-        for name in ("input_names", "output_name", "input_units", "output_unit", "preprocessing")
-    }
-    return skip_missing_outputs(join((record, replace(matched, **names))))
+    return skip_missing_outputs(join_parts(Split(record, matched)))
 
 
 def _find_fault(entry: Assessment, changed: DynamicModel, data: Dataset, constraints: str) -> str:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from islands.estimation.estimator_table import Criterion
 from islands.estimation.refit import refit
 from islands.models.protocol import DynamicModel
-from islands.records.dataset import join
-from islands.records.split import Split
+from islands.records.split import Split, join_parts
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.evidence import join_errors
@@ -60,8 +59,8 @@ class AllDataFit:
         given = self._given, self._measure(self._given)
         if self._criterion is None:
             return given
-        whole = join((self._split.estimation, self._split.validation))
-        estimated = refit(self._given, self._criterion, whole, self._constraints, self._warm_up)
+        record = join_parts(self._split)
+        estimated = refit(self._given, self._criterion, record, self._constraints, self._warm_up)
         if isinstance(estimated, EvaluationOutcome):
             return given
         found = estimated, self._measure(estimated)
