@@ -13,7 +13,7 @@ from typing import Any
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Engine, SearchProblem
 from islands.evolution.presets import AUTO
-from islands.evolution.search_result import AnySearchResult, without_optional_steps
+from islands.evolution.search_result import AnySearchResult, SearchResult, without_optional_steps
 from islands.evolution.search_state import SearchState, sum_searches
 from islands.evolution.settings import Settings
 from islands.facade.automatic.choice import Choice
@@ -37,7 +37,7 @@ from islands_service.coordinator.identification_outcome import (
     write_recommended,
 )
 from islands_service.coordinator.job_run import JobRun
-from islands_service.coordinator.search_view import SearchFront, describe_migration
+from islands_service.coordinator.search_view import SearchFront, describe_fits, describe_migration
 from islands_service.domain.free_runs import SearchFreeRun
 from islands_service.domain.job import (
     BY_OWNER,
@@ -264,7 +264,9 @@ def _identify(
     elif preset == AUTO and isinstance(record, Dataset):
         assert not isinstance(validation, CoupledRecord)
         try:
-            preset = choose_preset(record, validation, spec.changes, reporter.report_stage, stop)
+            preset = choose_preset(
+                record, validation, spec.changes, reporter.report_stage, stop, reporter.keep_fits
+            )
         except StoppedFitError as stopped:
             return Result.from_search(stopped.found).with_wall_time(reporter.spent).search_result
     reporter.choice = preset if isinstance(preset, Choice) else None
@@ -308,6 +310,7 @@ class ProgressReporter:
     ) -> None:
         self._warnings = {"warnings": list(warnings)} if warnings else {}
         self._outputs, self._seed, self._front = len(spec.outputs), spec.seed, front
+        self._fits: list[dict[str, Any]] = []
         self._free_run = StoredFreeRun(run.job, run.blobs)
         self._phases = _make_progress(self._keep_stage, spec, samples)
         self._run, self._checkpoints, self._stop = run, checkpoints, stop
@@ -352,6 +355,10 @@ class ProgressReporter:
             # Continue the search. The next report has the progress.
             self._outage.fail(error, job=self._run.job.id)
 
+    def keep_fits(self, found: SearchResult) -> None:
+        """Keep the models of the fits so far as the front of the next reports, until the search has one."""
+        self._fits = describe_fits(found)
+
     def _keep_stage(self, message: str, fraction: float | None = None, /) -> None:
         """Keep the phase, the completed fraction of the job and the time left for the next report."""
         now = monotonic()
@@ -376,7 +383,7 @@ class ProgressReporter:
         """Return the progress of earlier attempts, without their note."""
         before = {} if self._note else {**(self._run.job.progress or {})}
         before.pop("note", None)
-        return {**before, **self._note}
+        return {**before, **({"front": self._fits} if self._fits else {}), **self._note}
 
     def flush(self) -> None:
         """Store the last state. Retry while the store is unavailable, unless the job is cancelled."""

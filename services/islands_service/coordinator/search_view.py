@@ -5,10 +5,10 @@ the best model is larger, and is stored once.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from math import sqrt
+from collections.abc import Iterable, Mapping, Sequence
+from math import inf, sqrt
 from time import monotonic
-from typing import Any
+from typing import Any, TypeVar
 
 import structlog
 
@@ -16,16 +16,21 @@ from islands.estimation.fitted_state_space import FittedStateSpace
 from islands.evolution.engine import SearchProblem
 from islands.evolution.individual import AnyIndividual, AnyPopulation
 from islands.evolution.migration import parse_topology
+from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation
+from islands.models.latent import LatentModel
 from islands.models.narx import require_narx
 from islands.records.channel_names import parse_channel_name
 from islands.records.input_lead import advance_all_inputs
+from islands.validation.evidence import name_form
 from islands_service.domain.free_runs import SearchFreeRun, simulate_searched
 from islands_service.runtime import ClusterError
 
 log = structlog.get_logger()
+
+M = TypeVar("M")
 
 #: Largest number of models of a front, and of characters of an equation: together less than 7 kB.
 MAX_MODELS, MAX_CHARACTERS = 16, 300
@@ -91,6 +96,25 @@ class SearchFront:
         return self._front
 
 
+def describe_fits(found: SearchResult) -> list[dict[str, Any]]:
+    """Return the front of the fits before a search, as `SearchFront.update` does that of the search.
+
+    Parameters
+    ----------
+    found : SearchResult
+        All models so far. Their errors are those of the free run on the estimation data.
+    """
+    front: list[dict[str, Any]] = []
+    errors = [(each.model, each.metrics["estimation"]["free_run"].rmse) for each in found.models]
+    for model, error in sorted(errors, key=lambda each: (each[0].free_size, each[1])):
+        if error < min((each["error"] for each in front), default=inf):
+            text = model.equation().named
+            if isinstance(model, LatentModel):
+                text = f"{name_form(model)}, {model.structure}"
+            front.append({"size": model.free_size, "error": error, "equation": _shorten(text)})
+    return list(_thin_out(front))
+
+
 def _find_small(front: AnyPopulation) -> AnyIndividual:
     """Return the smallest model whose error is near the least one."""
     most = _SHOWN_RATIO**2 * min(model.fitness for model in front)
@@ -127,17 +151,19 @@ def describe_migration(state: SearchState, settings: Settings, seed: int) -> dic
     return {"generation": generation, "emigrants": emigrants, "sources": [list(each) for each in sources]}
 
 
-def _thin_out(front: AnyPopulation) -> Iterable[AnyIndividual]:
+def _thin_out(front: Sequence[M]) -> Iterable[M]:
     """Return at most `MAX_MODELS` models of a front, among them the first and the last one."""
     last, count = len(front) - 1, min(len(front), MAX_MODELS)
     return (front[round(at * last / max(1, count - 1))] for at in range(count))
 
 
 def _describe(individual: AnyIndividual, problem: SearchProblem) -> dict[str, Any]:
-    text = _write_equation(individual, problem)
-    if len(text) > MAX_CHARACTERS:
-        text = f"{text[: MAX_CHARACTERS - 1]}…"
+    text = _shorten(_write_equation(individual, problem))
     return {"size": individual.size, "error": sqrt(individual.fitness), "equation": text}
+
+
+def _shorten(equation: str) -> str:
+    return equation if len(equation) <= MAX_CHARACTERS else f"{equation[: MAX_CHARACTERS - 1]}…"
 
 
 def _write_equation(individual: AnyIndividual, problem: SearchProblem) -> str:

@@ -11,6 +11,7 @@ from islands.errors import SettingsError
 from islands.progress import Steps
 
 if TYPE_CHECKING:
+    from islands.cli.progress_display import Display
     from islands.evolution.search_result import SearchResult
     from islands.facade.results.identification import Result
 
@@ -40,18 +41,20 @@ def check_folder(folder: Path, force: bool, result: str = "result.json") -> None
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 
 
-def keep_models(folder: Path, outputs: Sequence[str]) -> Callable[["SearchResult"], None]:
-    """Return a callback that writes the models of a search to a folder before the steps after the search.
+def keep_models(folder: Path, outputs: Sequence[str], show: "Display") -> Callable[["SearchResult"], None]:
+    """Return a callback that writes the models so far to a folder, and shows them below a progress bar.
 
     Of several outputs, the models of each are written to its folder.
     """
     # The help of a command does not need it.
     from islands.report.documents.result_folder import list_folders, write_interim_result  # noqa: PLC0415
+    from islands.report.text.layout import front_table  # noqa: PLC0415
 
     folders = [""] if len(outputs) == 1 else list_folders(outputs)
 
     def write(found: "SearchResult") -> None:
-        write_interim_result(found, folder / folders[outputs.index(found.record.output_name)])
+        document = write_interim_result(found, folder / folders[outputs.index(found.record.output_name)])
+        show(lines=front_table(document))
 
     return write
 

@@ -33,15 +33,16 @@ class Display(Protocol):
 
     def __call__(
         self,
-        message: str,
+        message: str | None = None,
         fraction: float | None = None,
         /,
-        lines: Sequence[str] = (),
+        lines: Sequence[str] | None = None,
         seconds_left: float | None = None,
     ) -> None:
         """Show a message next to the bar, the completed fraction, and lines below the bar.
 
-        The time left follows from the fractions, unless it is given.
+        Message and lines stay until others are given. The time left follows from the fractions, unless it is
+        given.
         """
         ...
 
@@ -97,10 +98,10 @@ def progress(title: str, least: float = MIN_FRACTION) -> Iterator[Display]:
     with Live(bar, console=errors, transient=True, refresh_per_second=10, auto_refresh=shown) as live:
 
         def show(
-            message: str,
+            message: str | None = None,
             fraction: float | None = None,
             /,
-            lines: Sequence[str] = (),
+            lines: Sequence[str] | None = None,
             seconds_left: float | None = None,
         ) -> None:
             if fraction is not None:
@@ -108,7 +109,8 @@ def progress(title: str, least: float = MIN_FRACTION) -> Iterator[Display]:
             if seconds_left is not None:
                 left.expect(seconds_left, monotonic())
             bar.update(task, description=message, completed=fraction)
-            live.update(Group(bar, *(Text(line) for line in lines)))
+            if lines is not None:
+                live.update(Group(bar, *(Text(line) for line in lines)))
 
         yield show
 

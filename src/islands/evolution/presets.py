@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.errors import SettingsError, lookup, suggest
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
-from islands.evolution.settings import LATENT, NARX, STRUCTURES_OF, Settings
+from islands.evolution.settings import EFFORTS, LATENT, NARX, STRUCTURES_OF, Settings
 
 #: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5. What the paper leaves open is as
 #: in the authors' toolbox: tournaments of two, a distinct elite, parents in place of children that are too
@@ -117,7 +117,8 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 #: Settings of latent models. Any other one has no effect on them, and cannot be changed.
 LATENT_SETTINGS = frozenset(
     {
-        *("model_class", "structure", "constraints", "population", "generations", "elite", "crossover"),
+        *("model_class", "structure", "constraints", "population", "effort", "generations"),
+        *("elite", "crossover"),
         *("tournament", "islands", "topology", "migrate_every", "migrants", "emigrants"),
         *("replaced", "max_evaluations", "target_error", "refit"),
     }
@@ -290,7 +291,9 @@ def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
         changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}
     if "max_height" in changes and "initial_height" not in changes:
         changes = {**changes, "initial_height": max(0, min(base.initial_height, changes["max_height"]))}
-    return replace(base, **changes)
+    effort = changes.get("effort", base.effort)
+    generations = base.generations * lookup(EFFORTS, effort, "effort")
+    return replace(base, **{"generations": generations, **changes})
 
 
 def resolve_coupled_settings(preset: str, changes: Mapping[str, Any]) -> Settings:

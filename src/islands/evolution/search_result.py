@@ -342,7 +342,7 @@ def add_models(found: SearchResult, models: Sequence[Assessment]) -> SearchResul
 def as_candidate(entry: Assessment) -> ValidatedModel[DynamicModel]:
     """Return an assessed model that was estimated as a candidate of an ensemble."""
     assert entry.criterion is not None, "the models of a search are estimated"
-    return ValidatedModel(entry.model, entry.criterion, entry.mean_square)
+    return ValidatedModel(entry.model, entry.criterion, entry.mean_square, entry.all_data)
 
 
 def complete_search(

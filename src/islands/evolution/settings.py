@@ -57,6 +57,10 @@ OVERLONG: Mapping[str, str] = MappingProxyType(
     {"truncate": "the last genes are left out", "parent": "a parent takes the place of the child"}
 )
 
+#: Generations of a search relative to those of its preset, by effort. Without a generation, the result is the
+#: front of the fits, with the models that would seed the search.
+EFFORTS: Mapping[str, int] = MappingProxyType({"quick": 0, "normal": 1, "deep": 5})
+
 #: What counts among models that the data do not distinguish.
 PREFERENCES = (READABLE, ACCURATE) = ("readable", "accurate")
 
@@ -123,6 +127,13 @@ class Settings:
     """
 
     population: Integer = setting(500, "Offspring of each generation: individuals of an island.", ge=1)
+    effort: str = setting(
+        "normal",
+        "Length of the search, unless `generations` are given: `quick` compares the models of fits, `normal` "
+        "evolves as long as the preset says, `deep` five times as long.",
+        choices=EFFORTS,
+        daily=True,
+    )
     generations: Integer = setting(500, "Generations of a search, at most.", ge=0, daily=_OF_PRESET)
     elite: float = setting(0.1, "Fraction of the population that is kept as elite.", ge=0, le=1)
     crossover: float = setting(0.8, "CXPB: probability that a pair recombines.", ge=0, le=1)

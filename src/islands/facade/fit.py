@@ -129,6 +129,7 @@ def fit_record(
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
+    on_front: ResultCallback | None = None,
     on_models: ResultCallback = ignore_result,
     equations_only: bool = False,
     **changes: Any,
@@ -141,6 +142,8 @@ def fit_record(
     validation : Dataset, CoupledRecord or float
     refine_together, seed, progress, stop, **changes
         As for `fit`.
+    on_front : callable, optional
+        Called with the models of one output so far, whenever some are added.
     on_models : callable
         Called with the ranked models of each output, before the optional steps.
     equations_only : bool
@@ -154,7 +157,7 @@ def fit_record(
     check_seed(seed)
     settings = FitSettings(**changes)
     if isinstance(record, CoupledRecord):
-        find = partial(fit_record, seed=seed, on_models=on_models)
+        find = partial(fit_record, seed=seed, on_front=on_front, on_models=on_models)
         data = split_coupled(record, validation)
         return fit_outputs(data, find, refine_together, seed, Steps(progress, stop), changes)
     assert not isinstance(validation, CoupledRecord)
@@ -170,7 +173,7 @@ def fit_record(
         found = replace(found, settings={**found.settings, **described})
         return Result.from_search(refit_models(found, validation, Steps(progress, stop)))
     try:
-        fit = fit_chosen_library(record, split, settings, seed, progress, stop, equations_only)
+        fit = fit_chosen_library(record, split, settings, seed, progress, stop, on_front, equations_only)
         fit = fit.with_settings(validation=held_out)
         on_models(fit.incomplete)
         found = fit.complete()

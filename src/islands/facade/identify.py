@@ -164,6 +164,7 @@ def identify_record(
     stop: Stop = never_stop,
     start: SearchState | None = None,
     engine: Engine | Ray | str | None = None,
+    on_front: ResultCallback | None = None,
     on_models: ResultCallback = ignore_result,
     equations_only: bool = False,
     **changes: Any,
@@ -176,6 +177,8 @@ def identify_record(
     validation : Dataset, CoupledRecord or float
     refine_together, preset, seed, progress, on_epoch, stop, start, engine, **changes
         As for `identify`.
+    on_front : callable, optional
+        Called with the models of one output so far, whenever fits of the preset ``auto`` add some.
     on_models : callable
         Called with the ranked models of each output, before the optional steps.
     equations_only : bool
@@ -193,7 +196,7 @@ def identify_record(
             raise SettingsError("a choice of auto is for one output: name a preset of several outputs")
         return identify_outputs(
             split_coupled(record, validation),
-            partial(identify_record, seed=seed, engine=engine, on_models=on_models),
+            partial(identify_record, seed=seed, engine=engine, on_front=on_front, on_models=on_models),
             refine_together,
             seed,
             steps,
@@ -206,7 +209,7 @@ def identify_record(
     parts = split_data(record, validation)
     if preset == AUTO:
         try:
-            preset = choose_preset(record, validation, changes, progress, stop)
+            preset = choose_preset(record, validation, changes, progress, stop, on_front)
         except StoppedFitError as stopped:
             return Result.from_search(stopped.found)
     if isinstance(preset, Choice):

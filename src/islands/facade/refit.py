@@ -9,23 +9,21 @@ from dataclasses import replace
 from functools import partial
 
 from islands.estimation.constraints.checks import check_constraints
-from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimator_table import Criterion
-from islands.estimation.estimators import estimate_with
-from islands.estimation.latent_refit import refit_latent
 from islands.estimation.quantity_errors import with_quantity_errors
-from islands.estimation.refinement import RefinedModel, refine
+from islands.estimation.refit import refit
 from islands.evolution.search_result import SearchResult, state_steps
 from islands.models.latent import LatentModel
-from islands.models.narx import Model, require_narx
+from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
 from islands.parallel import map_over_record
 from islands.progress import Steps
 from islands.records.averaging import average_samples
 from islands.records.compatibility import ColumnReference, match_record
-from islands.records.dataset import Dataset, join
+from islands.records.dataset import Dataset
 from islands.records.missing_outputs import skip_missing_outputs
 from islands.records.signal_map import map_signals
+from islands.records.split import Split, join_parts
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import Assessment, with_refit
@@ -34,14 +32,8 @@ from islands.validation.recommendation import is_sound
 #: Name of the step.
 _REFIT = "estimation of the parameters on all data"
 
-#: Estimators whose start is least squares, whatever the parameters are.
-_REGRESSIONS = ("least-squares", "extended-least-squares")
-
 #: Reason of a discarded estimate.
 _UNSOUND = "a physics check that the model passes would fail"
-
-#: Steps of a refinement, at most: the parameters of the estimation data are near those of all data.
-_STEPS = 10
 
 #: Largest increase of the free-run RMSE on all data, as a fraction. Least squares does not minimise that
 #: error: of a law under white equation noise, parameters that are nearer to the truth increase it by chance,
@@ -81,17 +73,14 @@ def refit_models(found: SearchResult, validation: Dataset | float, steps: Steps)
 
     def estimate_again(entry: Assessment, criterion: Criterion) -> Assessment:
         data = match_record(entry.model, whole)
-        estimated = _estimate(entry, criterion, data, constraints, steps)
-        if isinstance(estimated, str):
-            changed, reason = entry.model, estimated
-        elif isinstance(estimated, LatentModel):
-            reason = _find_fault(entry, estimated, data, constraints)
-            changed = estimated
-            if not reason:
-                changed = with_quantity_errors(estimated, data, entry.warm_up, constraints)
+        stop = partial(steps.skip, _REFIT)
+        estimated = refit(entry.model, criterion, data, constraints, entry.warm_up, stop)
+        if isinstance(estimated, EvaluationOutcome):
+            changed, reason = entry.model, f"the estimation fails ({estimated.reason})"
         else:
-            changed = entry.model.with_parameters(estimated.parameters, estimated.standard_errors)
-            reason = _find_fault(entry, changed, data, constraints)
+            changed, reason = estimated, _find_fault(entry, estimated, data, constraints)
+            if isinstance(changed, LatentModel) and not reason:
+                changed = with_quantity_errors(changed, data, entry.warm_up, constraints)
         made = with_refit(entry, changed, data.samples, reason, found.split, constraints)
         # A recommendation states the checks that a model passes.
         passes = [is_sound(each, found.requires_property_1) for each in (entry.physics, made.final_physics)]
@@ -113,37 +102,7 @@ def join_data(record: Dataset, validation: Dataset | float) -> Dataset:
         return skip_missing_outputs(record)
     columns = ColumnReference(record.input_names, record.output_name, record.dt, 1, record.preprocessing)
     matched, _ = map_signals(columns, validation)
-    names = {
-        name: getattr(record, name)
-        for name in ("input_names", "output_name", "input_units", "output_unit", "preprocessing")
-    }
-    return skip_missing_outputs(join((record, replace(matched, **names))))
-
-
-def _estimate(
-    entry: Assessment, criterion: Criterion, data: Dataset, constraints: str, steps: Steps
-) -> DynamicModel | str:
-    """Return a model with the parameters that minimise its criterion; a reason if there are none."""
-    model, limits = entry.model, (constraints, entry.warm_up)
-    stop = partial(steps.skip, _REFIT)
-    if isinstance(model, LatentModel):
-        refitted = refit_latent(model, data, _STEPS, stop, constraints)
-        return refitted if isinstance(refitted, LatentModel) else f"the estimation fails ({refitted.reason})"
-    found: FittedStructure | RefinedModel[DynamicModel] | EvaluationOutcome
-    if criterion.estimator in _REGRESSIONS:
-        found = estimate(require_narx(model).regressors, data, *limits)
-        if isinstance(found, FittedStructure):
-            found = estimate_with(criterion.estimator, found, data, *limits)
-    else:
-        has_errors = model.standard_errors is not None
-        found = refine(
-            model, data, criterion.interval, *limits, _STEPS, standard_errors=has_errors, stop=stop
-        )
-    if isinstance(found, EvaluationOutcome):
-        return f"the estimation fails ({found.reason})"
-    if found.model.parameter_names != model.parameter_names:
-        return "the constraints would remove a term"
-    return found.model
+    return skip_missing_outputs(join_parts(Split(record, matched)))
 
 
 def _find_fault(entry: Assessment, changed: DynamicModel, data: Dataset, constraints: str) -> str:

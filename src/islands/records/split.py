@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -57,6 +58,15 @@ class Split:
     def __post_init__(self) -> None:
         matched = match_record(self.estimation, self.validation, "the estimation data", "the validation data")
         object.__setattr__(self, "validation", matched)
+
+
+# All models of a split are fitted to the same record, whose caches they share.
+@lru_cache(maxsize=4)
+def join_parts(split: Split) -> Dataset:
+    """Return both parts of a split as one record, with the columns of the estimation data."""
+    columns = ("input_names", "output_name", "input_units", "output_unit", "preprocessing")
+    names = {name: getattr(split.estimation, name) for name in columns}
+    return join((split.estimation, replace(split.validation, **names)))
 
 
 def split(record: Dataset, fraction: float = 0.25) -> Split:

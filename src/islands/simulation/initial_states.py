@@ -222,6 +222,8 @@ def estimate_initial_states(
         States at the last sample of the warm-up; NaN if the model diverges before it, so that the free run
         diverges at its first sample.
     """
+    if not model.order:  # one interval for every sample of a static model has as many estimates
+        return np.empty((len(start), 0))
     parts = [(first - warm_up, first) for first in start.tolist()]
     return np.array([_continue(model, *estimate_first_states(model, record, *part)) for part in parts])
 

@@ -23,7 +23,7 @@ from islands.rounding import RESOLUTION
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
-from islands.validation.evidence import join_errors
+from islands.validation.all_data_fit import AllDataFit
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
@@ -140,8 +140,8 @@ class Assessment:
         Residual tests and physics checks, which are made when they are read.
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
-    errors : ndarray, shape (samples,)
-        Errors of the free runs on the estimation data and on the validation data; see `join_errors`.
+    all_data : AllDataFit
+        Errors with parameters that are estimated on all data, by which models are compared.
     constraints : tuple of ConstraintCheck
         The constraints, each with its target and the value of the model.
     recordings : mapping
@@ -161,7 +161,7 @@ class Assessment:
     information: InformationCriteria
     checks: Checks
     warm_up: int
-    errors: NDArray[np.float64]
+    all_data: AllDataFit
     constraints: tuple[ConstraintCheck, ...] = ()
     recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
     bands: PredictionBands | None = None
@@ -190,10 +190,15 @@ class Assessment:
         return inf if isnan(error) else error
 
     @property
-    def mean_square(self) -> float:
-        """Mean squared error of the free run on all data, relative to the squared output range.
+    def errors(self) -> NDArray[np.float64]:
+        """Errors of the free runs on both parts of the data, with the parameters of all data."""
+        return self.all_data.errors
 
-        Errors below the resolution of files are equal; infinite after a divergence.
+    @property
+    def mean_square(self) -> float:
+        """Mean square of these errors.
+
+        Those below the resolution of files are equal; infinite after a divergence.
         """
         return max(float(np.nanmean(self.errors**2)), RESOLUTION**2)
 
@@ -290,7 +295,7 @@ def assess(
         _compute_information(split.estimation, runs["estimation"]["one_step_ahead"], free),
         Checks(model, split, warm_up),
         first,
-        join_errors(*((getattr(split, part), runs[part]["free_run"]) for part in PARTS)),
+        AllDataFit(model, criterion, split, constraints, first),
         check_constraints(model, constraints),
         recordings,
         criterion=criterion,

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from islands.estimation.block_bootstrap import draw_parameters
 from islands.estimation.estimator_table import Criterion
-from islands.models.coupled_narx import AnyModel
+from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.narx import Model
 from islands.records.coupled import AnyRecord, CoupledSplit
 from islands.records.dataset import Dataset
@@ -29,6 +29,7 @@ from islands.records.split import Split
 from islands.rounding import ROUNDING
 from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_outputs
 from islands.simulation.predictors import free_run, free_runs
+from islands.validation.all_data_fit import AllDataFit
 from islands.validation.equal_laws import find_laws
 from islands.validation.evidence import ErrorNoise, count_terms, join_errors, measure_lack, measure_size
 
@@ -62,11 +63,14 @@ class ValidatedModel(Generic[M]):
         Error that its parameters minimise.
     error : float
         Mean squared error of the free run on all data (see `measure_square`); infinite if it diverges.
+    all_data : AllDataFit or None
+        Fit by which the model is weighed. None if its parameters are not estimated on all data yet.
     """
 
     model: M
     criterion: Criterion
     error: float
+    all_data: AllDataFit | None = None
 
     @property
     def size(self) -> int:
@@ -218,7 +222,7 @@ def make_ensemble(
         None if the free run of every candidate diverges, or if ``skip`` returned true.
     """
     structures = []
-    kept = _weigh(_best_of_each_structure(candidates), split, warm_up, recommended)
+    kept = _weigh(_best_of_each_structure(candidates), split, constraints, warm_up, recommended)
     laws = find_laws([candidate.model for candidate, _ in kept], split.validation, warm_up, recommended)
     for position, ((candidate, weight), law) in enumerate(zip(kept, laws, strict=True)):
         if skip():
@@ -319,6 +323,7 @@ def _best_of_each_structure(candidates: Sequence[ValidatedModel[M]]) -> list[Val
 def _weigh(
     candidates: list[ValidatedModel[M]],
     split: Split | CoupledSplit,
+    constraints: str,
     warm_up: int,
     recommended: AnyModel | None,
 ) -> list[tuple[ValidatedModel[M], float]]:
@@ -326,12 +331,13 @@ def _weigh(
 
     The recommended one is the last if its weight is smaller.
     """
-    models: list[AnyModel] = [candidate.model for candidate in candidates]
-    if not models:
+    if not candidates:
         return []
-    closest = min(candidates, key=lambda each: each.error).model
-    noise = ErrorNoise.fit(_measure_errors(closest, split, warm_up), split.segments)
-    squares = [noise.measure(_measure_errors(model, split, warm_up)) for model in models]
+    models = [_fit_all_data(candidate, split, constraints, warm_up) for candidate in candidates]
+    errors = [_measure_errors(model, split, warm_up) for model in models]
+    closest = min(errors, key=lambda each: float(np.nanmean(each**2)))
+    noise = ErrorNoise.fit(closest, split.segments)
+    squares = [noise.measure(each) for each in errors]
     sizes, terms = [measure_size(model) for model in models], count_terms(models)
     lack = measure_lack(models, sizes, squares, noise.samples, terms)
     # An estimate of initial outputs that the error lacks changes it by less than this part.
@@ -348,6 +354,16 @@ def _weigh(
         weights = np.maximum(weights, np.finfo(float).tiny)
     kept = weights[order] / weights[order].sum()
     return [(candidates[index], float(weight)) for index, weight in zip(order, kept, strict=True)]
+
+
+def _fit_all_data(
+    candidate: ValidatedModel[M], split: Split | CoupledSplit, constraints: str, warm_up: int
+) -> AnyModel:
+    """Return a candidate with the parameters of all data; one of several outputs keeps its own."""
+    if isinstance(split, CoupledSplit) or isinstance(candidate.model, CoupledModel):
+        return candidate.model
+    fit = candidate.all_data
+    return (fit or AllDataFit(candidate.model, candidate.criterion, split, constraints, warm_up)).model
 
 
 def measure_square(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:

@@ -190,7 +190,7 @@ def _measure_square(noise: ErrorNoise, entry: Comparable) -> float:
 
 def _identify(entry: Comparable) -> object:
     """Return an object that lives as long as the errors of a model."""
-    return entry.checks if isinstance(entry, Assessment) else entry
+    return entry.all_data if isinstance(entry, Assessment) else entry
 
 
 def _take_simplest(

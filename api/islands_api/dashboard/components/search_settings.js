@@ -22,6 +22,9 @@ function readValue(text, type) {
 const makeField = (name, schema) =>
   makeInput(schema, { name, id: `setting-${name}`, "aria-describedby": `meaning-${name}` });
 
+/** Settings that are shown next to the preset, before the others. */
+const EVERYDAY = ["effort", "prefer"];
+
 /** Preset whose structure is chosen next to it, and what its values mean. */
 const LATENT = "latent";
 const STRUCTURES = "auto: curves anywhere. wiener: only the output reads them. hammerstein: they read the "
@@ -47,6 +50,7 @@ export function makeSearchSettings(initial, onChange, signal) {
   preset.append(el("option", { value: chosen }, chosen));
   const hint = el("span", { class: "soft small", id: "preset-hint" });
   const list = el("div", { class: "settings" }, el("p", { class: "loading" }, "Loading…"));
+  const everyday = el("div", { class: "settings" });
   const count = el("span", { class: "soft small" });
   const structure = makeStructure();
   let [presets, fields] = [[], new Map()];
@@ -111,7 +115,11 @@ export function makeSearchSettings(initial, onChange, signal) {
       const text = (each) => el("option", { value: each.name }, each.name);
       preset.replaceChildren(...items.map(text));
       preset.value = chosen;
-      list.replaceChildren(...Object.entries(settings).map(makeRow));
+      const rows = Object.entries(settings).map((entry) => [entry[0], makeRow(entry)]);
+      const take = (isEveryday) =>
+        rows.filter(([name]) => EVERYDAY.includes(name) === isEveryday).map(([, row]) => row);
+      everyday.replaceChildren(...take(true));
+      list.replaceChildren(...take(false));
       const { structures } = items.find(({ name }) => name === LATENT);
       structure.select.replaceChildren(...structures.map((each) => el("option", { value: each }, each)));
       if (chosen === LATENT) structure.select.value = initial.settings?.structure ?? "auto";
@@ -125,10 +133,13 @@ export function makeSearchSettings(initial, onChange, signal) {
     update();
   });
   structure.select.addEventListener("input", update);
-  list.addEventListener("input", update);
+  [everyday, list].forEach((each) => each.addEventListener("input", update));
   return {
     nodes: [
-      el("div", { class: "fields" }, el("label", { for: "preset" }, "Preset"), preset, hint, structure.nodes),
+      [
+        el("div", { class: "fields" }, el("label", { for: "preset" }, "Preset"), preset, hint, structure.nodes),
+        everyday,
+      ],
       el("details", { open: Boolean(initial.settings) }, el("summary", {}, "Advanced settings", count), list),
     ],
     /** Return the fields `preset` and `settings` of a request. */

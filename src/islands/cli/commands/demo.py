@@ -89,7 +89,7 @@ def demo(
                 islands=ISLANDS,
                 progress=searching,
                 on_epoch=searching.show_epoch,
-                on_models=keep_models(out, estimation.output_names),
+                on_models=keep_models(out, estimation.output_names, show),
                 stop=stop,
                 engine=engine,
             )

@@ -58,11 +58,13 @@ def fit(
             if settings.model == NARX
             else class_phases(settings.model, data.samples, outputs)
         )
+        keep = keep_models(out, data.output_names, show)
         search = partial(
             fit_record,
             data,
             held_out,
-            on_models=keep_models(out, data.output_names),
+            on_front=keep,
+            on_models=keep,
             seed=seed,
             progress=PhasedProgress(show, phases),
             stop=stop,

@@ -24,6 +24,7 @@ from islands.evolution.presets import (
     resolve_kinds,
     resolve_settings,
 )
+from islands.evolution.search_result import ResultCallback
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.facade.automatic.choice import Choice, choice_from_document
@@ -127,10 +128,12 @@ def run(
                 # Delete the files of an earlier run.
                 for name in (CHECKPOINT, HALL, TEST):
                     (folder / name).unlink(missing_ok=True)
-            preset = job["preset"]
+            preset, keep = job["preset"], keep_models(folder, data.output_names, show)
             searching = _make_display(show, job, data, possible[0])
             if preset == AUTO and len(job["outputs"]) == 1:
-                preset = _choose_preset(data, held_out, job, searching, stop, folder, run_options.figures)
+                preset = _choose_preset(
+                    data, held_out, job, searching, stop, keep, folder, run_options.figures
+                )
                 # Checkpoints contain the job, so a resumed run does not choose again.
                 job = {**job, "choice": preset.to_checkpoint()}
             checkpoints = _CheckpointWriter(folder, job, searching, state, spent)
@@ -140,7 +143,7 @@ def run(
                     identify_record,
                     data,
                     held_out,
-                    on_models=keep_models(folder, data.output_names),
+                    on_models=keep,
                     start=state,
                     progress=searching,
                     on_epoch=checkpoints,
@@ -200,6 +203,7 @@ def _choose_preset(
     job: dict[str, Any],
     progress: ProgressCallback,
     stop: StopRequests,
+    keep: ResultCallback,
     folder: Path,
     figures: Sequence[str],
 ) -> Choice:
@@ -210,7 +214,7 @@ def _choose_preset(
     if stored := job.get("choice"):
         return choice_from_document(stored)
     try:
-        return choose_preset(data, held_out, job["changes"], progress, stop)
+        return choose_preset(data, held_out, job["changes"], progress, stop, keep)
     except StoppedFitError as stopped:
         result, drawing = islands.Result.from_search(stopped.found), Steps(stop=stop)
         result.save(folder, drawing, figures)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
-from islands.evolution.search_result import SearchResult, take_recommended
+from islands.evolution.search_result import ResultCallback, SearchResult, take_recommended
 from islands.facade.automatic.choice import Choice
 from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
 from islands.facade.fit_settings import FitSettings
@@ -50,6 +50,7 @@ def choose_kind(
     least: int,
     seed: int,
     steps: Steps,
+    on_front: ResultCallback | None,
 ) -> tuple[Choice, Front | None]:
     """Choose the kind of a record.
 
@@ -74,6 +75,8 @@ def choose_kind(
     seed : int
         Stored in the results.
     steps : Steps
+    on_front : callable, optional
+        Called with the result of all models so far: of the linear model, and after every fit.
 
     Raises
     ------
@@ -89,8 +92,10 @@ def choose_kind(
     # Models of hysteresis keep a property that no simple model has.
     free = [each for each in libraries.values() if not _is_constrained(each)]
     linear = find_linear_result(record, split, free[0], settings, seed, steps) if free else None
+    if linear and on_front:
+        on_front(linear)
     try:
-        return _choose_kind(record, split, libraries, settings, least, seed, steps)
+        return _choose_kind(record, split, libraries, settings, least, seed, steps, on_front)
     except StoppedFitError:
         raise
     except StoppedError as stopped:
@@ -107,6 +112,7 @@ def _choose_kind(
     least: int,
     seed: int,
     steps: Steps,
+    on_front: ResultCallback | None,
 ) -> tuple[Choice, Front | None]:
     """Choose the kind of a record; see `choose_kind`."""
     estimation = split.estimation
@@ -123,7 +129,7 @@ def _choose_kind(
     data = data or prepare_data(split, settings.average, settings.feedthrough, first, least, steps)
     free = [kind for kind, library in late.items() if not _is_constrained(library)]
     simple = list_simple(data, late[free[0]], settings, steps) if free else []
-    fits = _KindFits(record, data, simple, settings, seed, steps)
+    fits = _KindFits(record, data, simple, settings, seed, steps, on_front)
     fits.add({kind: late[kind] for kind in promising})
     if _find_least(simple) < _find_least(fits.bounded.values()) and not fits.known.intersection(free):
         rival = min(free, key=trials.errors.__getitem__)
@@ -183,6 +189,8 @@ class _KindFits:
     settings : FitSettings
     seed : int
     steps : Steps
+    on_front : callable, optional
+        Called with the result of all models after every fit.
     """
 
     def __init__(
@@ -193,10 +201,11 @@ class _KindFits:
         settings: FitSettings,
         seed: int,
         steps: Steps,
+        on_front: ResultCallback | None,
     ) -> None:
         self._record, self._data, self._simple = record, data, tuple(simple)
         self._settings, self._seed, self._steps = settings, seed, steps
-        self._fits: dict[str, LibraryFit] = {}
+        self._on_front, self._fits = on_front, dict[str, LibraryFit]()
 
     @property
     def known(self) -> frozenset[str]:
@@ -229,6 +238,8 @@ class _KindFits:
                 self._fits[name] = fit
                 if self._steps.left_out:
                     raise StoppedError(step)
+                if self._on_front:
+                    self._steps.call(self._on_front, self._take_found())
             except StoppedError as stopped:
                 if not self._fits:
                     raise

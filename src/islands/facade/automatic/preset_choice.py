@@ -7,6 +7,7 @@ from typing import Any
 
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import AUTO, accepts_fits, resolve_kinds, resolve_latent, with_tuples
+from islands.evolution.search_result import ResultCallback
 from islands.facade.automatic.choice import Choice, keep_models
 from islands.facade.automatic.kind_choice import choose_kind
 from islands.facade.automatic.latent_trial import LATENT_TRIAL, compare_latent
@@ -36,6 +37,7 @@ def choose_preset(
     changes: Mapping[str, Any],
     progress: ProgressCallback = ignore_progress,
     stop: Stop = never_stop,
+    on_front: ResultCallback | None = None,
 ) -> Choice:
     """Choose the kind of record and the dead times of the preset ``auto`` for ``identify``.
 
@@ -50,6 +52,8 @@ def choose_preset(
         Called with a message and the completed fraction.
     stop : callable, optional
         Called between all steps.
+    on_front : callable, optional
+        Called with the result of all models so far; see `choose_kind`.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def choose_preset(
     given = FitSettings(**common, delays=changes.get("library_delays"))
     least = max(each.maximum_lag for each in searches.values()) + _MORE_SAMPLES
     steps = Steps(progress, stop)
-    choice, front = choose_kind(record, split, libraries, given, least, 0, steps)
+    choice, front = choose_kind(record, split, libraries, given, least, 0, steps, on_front)
     if front is None or not record.output_range > 0.0:
         return choice
     models = list(front.found.models)
@@ -90,6 +94,7 @@ def fit_chosen_library(
     seed: int,
     progress: ProgressCallback,
     stop: Stop,
+    on_front: ResultCallback | None = None,
     equations_only: bool = False,
 ) -> Front:
     """Fit a library, or the one that is chosen if its name is ``auto``; see `islands.fit`.
@@ -115,6 +120,8 @@ def fit_chosen_library(
         if equations_only:
             return fit_one(library)
         linear = find_linear_result(record, split, library, settings, seed, steps)
+        if linear and on_front:
+            on_front(linear)
         try:
             return fit_one(library)
         except StoppedError as stopped:
@@ -124,7 +131,7 @@ def fit_chosen_library(
     kinds = resolve_kinds({} if constraints is None else {"constraints": constraints})
     libraries = {kind: take_library(each.library, degree, lags, constraints) for kind, each in kinds.items()}
     least = max(map(_count_needed, libraries.values()))
-    choice, front = choose_kind(record, split, libraries, settings, least, seed, steps)
+    choice, front = choose_kind(record, split, libraries, settings, least, seed, steps, on_front)
     # Without a model, the fit of the chosen library reports what is wrong.
     front = front or fit_one(libraries[choice.kind].with_delays(choice.delays))
     return front.with_settings(choice=_name_by_model(choice, libraries, front).to_document())

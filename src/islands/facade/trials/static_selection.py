@@ -13,6 +13,7 @@ from islands.facade.trials.rate_selection import compute_errors
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.split import Split
+from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment
 from islands.validation.evidence import ErrorNoise, is_static
 from islands.validation.recommendation import DECISIVE
@@ -55,7 +56,9 @@ def find_static(split: Split, library: TrialLibrary, steps: Steps) -> PreparedDa
         [*models, *assess_curve_models(split, 1, warm_up, "none", steps)]
     ):
         return None
-    own = take_recommended(models).errors[-split.validation.samples :]
+    best, held_out = take_recommended(models), advanced.validation
+    run = simulate_freely(best.model, held_out, best.warm_up)
+    own = (held_out.y - run.y) / split.estimation.output_range
     try:
         other = compute_errors(split, library, 1) / split.estimation.output_range
     except RecordError:

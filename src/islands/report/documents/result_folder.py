@@ -468,10 +468,15 @@ def residual_structure_document(structure: ResidualStructure) -> dict[str, Any]:
     }
 
 
-def write_result(found: AnySearchResult, folder: Path) -> None:
+def write_result(found: AnySearchResult, folder: Path) -> dict[str, Any]:
     """Write ``models/NN.json``, ``summary.txt``, ``method.txt`` of one output and, last, ``result.json``.
 
     Remove the model files of an earlier result in the same folder. A text that fails is an optional step.
+
+    Returns
+    -------
+    dict
+        Content of ``result.json``.
     """
     models = folder / "models"
     models.mkdir(parents=True, exist_ok=True)
@@ -494,11 +499,12 @@ def write_result(found: AnySearchResult, folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
     document["not_computed"] += list_failures(steps.not_computed)
     replace_file([_write_json(document).encode()], folder / "result.json")
+    return document
 
 
-def write_interim_result(found: SearchResult, folder: Path) -> None:
+def write_interim_result(found: SearchResult, folder: Path) -> dict[str, Any]:
     """Write a result before its optional steps, so that the end of the process loses none of its models."""
-    write_result(without_optional_steps(found, "the command ended before this step"), folder)
+    return write_result(without_optional_steps(found, "the command ended before this step"), folder)
 
 
 def finite(value: Any) -> Any:

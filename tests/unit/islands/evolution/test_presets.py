@@ -4,8 +4,8 @@ from dataclasses import asdict
 
 import pytest
 
-from islands.evolution.presets import PRESETS
-from islands.evolution.settings import Settings
+from islands.evolution.presets import PRESETS, resolve_settings
+from islands.evolution.settings import EFFORTS, Settings
 
 #: Sections 6.1 and 6.2 and Appendix A, as printed (the fitness function's sentence is shortened).
 CASE_1 = (
@@ -99,3 +99,12 @@ def test_presets_with_a_constraint_have_primitives_that_meet_it(preset):
         assert made.structure != "free"
         assert {"phi1", "phi2"} <= set(made.primitives)
         assert not {"sub", "sign"} & set(made.primitives)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_effort_sets_the_generations_that_are_not_given(preset):
+    found = [resolve_settings(preset, {"effort": each}).generations for each in EFFORTS]
+    assert found[0] == 0
+    assert found == sorted(found)
+    assert found[1] == PRESETS[preset].generations
+    assert resolve_settings(preset, {"effort": "deep", "generations": 7}).generations == 7

@@ -68,7 +68,7 @@ class Candidate:
             None,
             StatedChecks(physics=physics, split=SimpleNamespace(segments=())),
             0,
-            self.make_errors() if self.errors is None else self.errors,
+            StatedChecks(errors=self.make_errors() if self.errors is None else self.errors),
         )
 
     def make_errors(self):

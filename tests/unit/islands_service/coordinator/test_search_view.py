@@ -16,12 +16,14 @@ from islands.evolution.problem import Problem
 from islands.evolution.search_state import HistoryPoint, SearchState
 from islands.evolution.settings import Settings
 from islands.expressions.parsing import parse
+from islands.facade.fit import fit_record
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import regressor
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
 from islands_service.coordinator.search_view import (
     SearchFront,
+    describe_fits,
     describe_migration,
 )
 from islands_service.domain.free_runs import SEARCH_POINTS
@@ -105,6 +107,22 @@ def test_free_run_is_that_of_the_smallest_model_near_the_least_error() -> None:
     # The next search of a job begins without it.
     front.begin(PROBLEM)
     assert front.free_run is None
+
+
+def test_the_front_of_the_fits_has_models_of_every_form_with_falling_errors() -> None:
+    rng = np.random.default_rng(5)
+    u, y = rng.uniform(-1.0, 1.0, (300, 1)), np.zeros(300)
+    for k in range(1, 300):
+        y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1, 0] ** 2
+    record = Dataset(u, y + 0.001 * rng.standard_normal(300), 0.1, ("valve",), "level")
+    seen = []
+    fit_record(record, library="polynomial", lags=1, max_terms=3, certificate=0, on_front=seen.append)
+    (linear,) = describe_fits(seen[0])
+    assert linear["equation"].startswith("linear, order ")
+    front = describe_fits(fit_record(record, library="polynomial", lags=1, max_terms=3).search_result)
+    assert [each["size"] for each in front] == sorted({each["size"] for each in front})
+    assert all(larger["error"] < smaller["error"] for smaller, larger in pairwise(front))
+    assert any("valve(k-1)^2" in each["equation"] for each in front)
 
 
 def test_lost_islands_leave_the_front_as_it_is() -> None:

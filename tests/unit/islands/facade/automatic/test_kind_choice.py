@@ -50,6 +50,17 @@ def test_record_gets_the_library_of_its_kind(name, kind):
     assert compared[kind] <= 1.15 * min(compared.values())
 
 
+@pytest.mark.ci
+def test_the_front_begins_with_the_linear_model_and_only_grows():
+    data, fronts = record("tank", 400), []
+    settings = FitSettings(degree=2, certificate=0)
+    fit_chosen_library(data, split(data), settings, 0, ignore_progress, never_stop, fronts.append)
+    assert [name_form(each.model) for each in fronts[0].models] == ["linear"]
+    assert len(fronts) >= 3
+    least = [min(each.mean_square for each in front.models) for front in fronts]
+    assert least == sorted(least, reverse=True)
+
+
 @pytest.mark.nightly
 def test_dead_time_is_added_to_the_lags():
     choice, result = choose(record("dead time"))

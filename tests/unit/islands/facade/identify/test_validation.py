@@ -29,7 +29,7 @@ def test_validation_data_do_not_affect_the_search(data, result):
     ("changes", "message"),
     [
         ({"preset": "hystersis"}, "unknown preset 'hystersis': take one of auto, paper-case1"),
-        ({"populatoin": 3}, "unknown setting 'populatoin': take one of population, generations"),
+        ({"populatoin": 3}, "unknown setting 'populatoin': take one of population, effort, generations"),
         ({"population": 0}, "population is an integer of at least 1, got 0"),
         ({"generations": -1}, "generations is an integer of at least 0, got -1"),
         ({"max_terms": 0}, "max_terms is an integer of at least 1, got 0"),
