@@ -24,6 +24,7 @@ from islands.simulation.initial_outputs import has_estimated_start, simulate_fre
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.all_data_fit import AllDataFit
+from islands.validation.evidence import measure_size
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
@@ -182,6 +183,11 @@ class Assessment:
     def final_constraints(self) -> tuple[ConstraintCheck, ...]:
         """Constraints with the values of the final model."""
         return self.refit.constraints if self.refit else self.constraints
+
+    @property
+    def size(self) -> float:
+        """Number of terms by which the model is compared; see `measure_size`."""
+        return measure_size(self.model)
 
     @property
     def validation_error(self) -> float:

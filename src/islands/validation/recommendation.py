@@ -93,12 +93,7 @@ class _Selection:
             self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
-def recommend(
-    sizes: Sequence[float],
-    assessments: Sequence[Assessment],
-    hysteresis: bool,
-    accurate: bool = False,
-) -> Recommendation:
+def recommend(assessments: Sequence[Assessment], hysteresis: bool, accurate: bool = False) -> Recommendation:
     """Choose the simplest of the models with the most evidence.
 
     Candidates are the models whose free run on the validation data is bounded and, if the search constrains
@@ -109,8 +104,6 @@ def recommend(
 
     Parameters
     ----------
-    sizes : sequence of float
-        Numbers of terms as of `measure_size`, in the order of the ranks.
     assessments : sequence of Assessment
         Assessments on the same estimation data and validation data, best first.
     hysteresis : bool
@@ -130,7 +123,7 @@ def recommend(
     if sound:
         selection.keep(CHECKS, [at for at in selection.left if at in sound or at < sound[0]])
     terms = count_terms([entry.model for entry in assessments])
-    lack = _measure_lack(selection.left, sizes, assessments, terms)
+    lack = _measure_lack(selection.left, assessments, terms)
     reference = min(selection.left, key=lambda at: (lack[at], at))
     limit = lack[reference] + DECISIVE
     selection.keep(EVIDENCE, [at for at in selection.left if lack[at] <= limit])
@@ -138,7 +131,7 @@ def recommend(
     chosen = (
         min(selection.left, key=lambda at: (lack[at], at))
         if accurate
-        else _take_simplest(selection.left, sizes, assessments, lack)
+        else _take_simplest(selection.left, assessments, lack)
     )
     return Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
 
@@ -157,11 +150,10 @@ def recommend_joint(assessments: Sequence[CoupledAssessment], terms: int) -> Cou
     bounded = [at for at, entry in enumerate(assessments) if isfinite(entry.mean_square)]
     if not bounded:
         return assessments[0]
-    sizes = [entry.size for entry in assessments]
-    lack = _measure_lack(bounded, sizes, assessments, terms)
+    lack = _measure_lack(bounded, assessments, terms)
     limit = min(lack.values()) + DECISIVE
     equal = [at for at in bounded if lack[at] <= limit]
-    return assessments[_take_simplest(equal, sizes, assessments, lack)]
+    return assessments[_take_simplest(equal, assessments, lack)]
 
 
 def measure_squares(assessments: Sequence[Comparable]) -> tuple[list[float], int]:
@@ -194,10 +186,7 @@ def _identify(entry: Comparable) -> object:
 
 
 def _take_simplest(
-    places: Sequence[int],
-    sizes: Sequence[float],
-    assessments: Sequence[Comparable],
-    lack: Mapping[int, float],
+    places: Sequence[int], assessments: Sequence[Comparable], lack: Mapping[int, float]
 ) -> int:
     """Return the linear one of models with as much evidence, or a static one, or the smallest.
 
@@ -206,21 +195,19 @@ def _take_simplest(
     """
 
     def rank(at: int) -> tuple[bool, bool, bool, float, float, int]:
-        model = assessments[at].model
+        model, size = assessments[at].model, assessments[at].size
         linear, static = is_linear(model), is_static(model)
-        return not linear, not static, linear and isinstance(model, Model), sizes[at], lack[at], at
+        return not linear, not static, linear and isinstance(model, Model), size, lack[at], at
 
     return min(places, key=rank)
 
 
-def _measure_lack(
-    places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Comparable], terms: int
-) -> dict[int, float]:
+def _measure_lack(places: Sequence[int], assessments: Sequence[Comparable], terms: int) -> dict[int, float]:
     """Return the information criteria of some models, which have a bounded free run."""
     compared = [assessments[at] for at in places]
     squares, samples = measure_squares(compared)
-    models, own = [entry.model for entry in compared], [sizes[at] for at in places]
-    lack = measure_lack(models, own, squares, samples, terms)
+    models, sizes = [entry.model for entry in compared], [entry.size for entry in compared]
+    lack = measure_lack(models, sizes, squares, samples, terms)
     return dict(zip(places, lack.tolist(), strict=True))
 
 
