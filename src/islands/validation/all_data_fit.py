@@ -16,7 +16,7 @@ from islands.models.protocol import DynamicModel
 from islands.records.split import Split, join_parts
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.validation.evidence import join_errors
+from islands.validation.evidence import join_errors, mean_square
 
 
 class AllDataFit:
@@ -64,7 +64,7 @@ class AllDataFit:
         if isinstance(estimated, EvaluationOutcome):
             return given
         found = estimated, self._measure(estimated)
-        return min(found, given, key=lambda each: float(np.nanmean(each[1] ** 2)))
+        return min(found, given, key=lambda each: mean_square(each[1]))
 
     def _measure(self, model: DynamicModel) -> NDArray[np.float64]:
         parts = (self._split.estimation, self._split.validation)

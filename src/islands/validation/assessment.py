@@ -19,12 +19,11 @@ from islands.models.protocol import DynamicModel
 from islands.progress import Failure, attempt
 from islands.records.dataset import Dataset
 from islands.records.split import Split
-from islands.rounding import RESOLUTION
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.all_data_fit import AllDataFit
-from islands.validation.evidence import measure_size
+from islands.validation.evidence import mean_square, measure_size
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
@@ -202,11 +201,8 @@ class Assessment:
 
     @property
     def mean_square(self) -> float:
-        """Mean square of these errors.
-
-        Those below the resolution of files are equal; infinite after a divergence.
-        """
-        return max(float(np.nanmean(self.errors**2)), RESOLUTION**2)
+        """Mean square of these errors; infinite after a divergence."""
+        return mean_square(self.errors)
 
     @property
     def split(self) -> Split:

@@ -112,6 +112,21 @@ def join_errors(*parts: tuple[AnyRecord, Simulation]) -> NDArray[np.float64]:
     return relative
 
 
+def mean_square(errors: NDArray[np.float64]) -> float:
+    """Return the mean square of errors; infinite after a divergence.
+
+    Errors below the resolution of files are equal. With several outputs, it is the geometric mean: the
+    likelihood of independent normal errors with unknown variances depends on it.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (samples,) or (samples, outputs)
+        As of `join_errors`.
+    """
+    squares = np.nanmean(np.square(errors), axis=0)
+    return float(np.exp(np.mean(np.log(np.maximum(squares, RESOLUTION**2)))))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorNoise:
     """Noise of the errors of free runs: what remains of them is compared between models.
