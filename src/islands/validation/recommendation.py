@@ -17,10 +17,11 @@ from math import inf, isfinite, isnan
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
+from islands.models.form import is_linear, is_static
 from islands.models.narx import Model
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.evidence import ErrorNoise, count_terms, is_linear, is_static, measure_lack
+from islands.validation.evidence import ErrorNoise, count_terms, measure_lack
 from islands.validation.physics import PhysicsChecks
 
 #: Difference of the evidence of two models that do not count as equal.
