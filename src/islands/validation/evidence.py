@@ -26,6 +26,10 @@ from islands.records.segments import count_runs
 from islands.rounding import RESOLUTION
 from islands.simulation.predictors import Simulation
 
+#: Difference of the evidence of two models that do not count as equal: very strong evidence (Kass & Raftery,
+#: J. American Statistical Association 90 (1995) 773-795).
+DECISIVE = 10.0
+
 _ONE = Constant(1.0)
 
 

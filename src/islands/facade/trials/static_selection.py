@@ -15,8 +15,7 @@ from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.split import Split
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import ErrorNoise
-from islands.validation.recommendation import DECISIVE
+from islands.validation.evidence import DECISIVE, ErrorNoise
 from islands.validation.simple_models import assess_curve_models, assess_linear_model, assess_static_models
 
 #: Name of the step.

@@ -342,6 +342,7 @@ def _model_document(
         "named_signals": named_signals(model),
         "terms": terms_in_result(model, ensemble),
         **({"quantities": model.list_quantities()} if isinstance(model, LatentModel) else {}),
+        **({"laws": [asdict(each) for each in assessment.checks.laws]} if recommended else {}),
         "bands": bands_document(assessment.bands),
         "recordings": {
             part: {name: asdict(value) for name, value in by_name.items()}
