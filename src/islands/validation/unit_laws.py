@@ -15,7 +15,7 @@ if a further function of the same signal adds evidence to the law.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from math import exp, inf
+from math import inf
 from types import MappingProxyType
 
 import numpy as np
@@ -26,7 +26,7 @@ from islands.models.latent import LatentModel
 from islands.models.unit_functions import evaluate_curve, parse_unit
 from islands.records.dataset import Dataset
 from islands.records.split import Split
-from islands.rounding import ROUNDING
+from islands.rounding import RESOLUTION, ROUNDING
 from islands.simulation.blocks import UnitRun, simulate_units
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.evidence import DECISIVE, ErrorNoise, join_errors, measure_lack, measure_size
@@ -70,8 +70,8 @@ _STEPS_IF_STEEP, _SIGN = frozenset({"saturation", "tanh"}), "sign (dry friction)
 #: Name of a one-sided line beside a line.
 _KINK = "kink between two lines"
 
-#: Magnitude of a pole whose time constant is one sample.
-_ONE_SAMPLE = exp(-1.0)
+#: Magnitude of a pole that halves a deviation within a sample.
+_HALF = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +200,8 @@ def _name(kept: _Candidate, curve: _Curve, split: Split, warm_up: int) -> UnitLa
     if len({each.name for each in smallest}) != 1:
         return None
     chosen = smallest[0]
+    if chosen.name == _SIGN:  # The samples do not show how steep it is.
+        return _describe(chosen, curve, split.estimation)
     further = [_estimate(_append(chosen, curve, law), split, warm_up, chosen.has_line) for law in LAWS]
     lack = _measure_lack([chosen, *(each for each in further if each is not None)], split)
     return _describe(chosen, curve, split.estimation) if lack[0] <= lack.min() + DECISIVE else None
@@ -244,20 +246,41 @@ def _find_name(model: LatentModel, run: UnitRun, has_line: bool) -> str:
         return f"signed {name}"
     if law == "hinge" and has_line:
         name = _KINK
-    if law in _STEPS_IF_STEEP and _rests_at_once(model):
+    if not all(low < each < high for each in bends):
+        return ""
+    if law in _STEPS_IF_STEEP and _is_step(model, run):
         return _SIGN
-    return name if all(low < each < high for each in bends) else ""
+    return "" if _is_too_fast(model, run) else name
 
 
-def _rests_at_once(model: LatentModel) -> bool:
-    """Return whether a state comes to rest within a sample where the slope of the last unit is one.
+def _is_step(model: LatentModel, run: UnitRun) -> bool:
+    """Return whether samples do not show the zone between the limits of a saturation in a feedback.
 
-    Samples do not show the width of this zone, so that the law is a step.
+    A change by half of the zone in a sample leaves fewer than two samples in it whenever it is passed.
     """
-    of = model.matrices
-    outside, inside = of["A"], of["A"] + np.outer(of["E"][:, -1], of["W"][-1])
-    fastest = [np.abs(np.linalg.eigvals(each)).min(initial=1.0) for each in (inside, outside)]
-    return bool(fastest[0] < _ONE_SAMPLE <= fastest[1])
+    arguments = run.arguments[-1]
+    inside = np.abs(arguments) < 1.0
+    touching = np.diff(arguments)[inside[1:] | inside[:-1] | (np.diff(np.sign(arguments)) != 0.0)]
+    in_feedback = model.matrices["W"][-1].any() and touching.size
+    return bool(in_feedback and np.sqrt(np.mean(touching**2)) > 1.0)
+
+
+def _is_too_fast(model: LatentModel, run: UnitRun) -> bool:
+    """Return whether a pole halves a deviation within a sample at some slope of the law, and not at others.
+
+    What the samples show is then another curve than that between samples.
+    """
+    of, arguments = model.matrices, np.sort(run.arguments[-1])
+    arguments = arguments[:: max(1, len(arguments) // _POINTS)]
+    step = RESOLUTION * max(float(np.ptp(arguments)), 1.0)
+    ahead, behind = (evaluate_curve(model.units[-1], arguments + shift) for shift in (step, -step))
+    slopes = (ahead - behind) / (2.0 * step)
+    by_size = slopes[np.argsort(np.abs(slopes))]
+    flat, steep = (
+        np.abs(np.linalg.eigvals(of["A"] + slope * np.outer(of["E"][:, -1], of["W"][-1]))).min(initial=1.0)
+        for slope in by_size[[0, -1]].tolist()
+    )
+    return bool((flat < _HALF) != (steep < _HALF))
 
 
 def _replace(model: LatentModel, curve: _Curve, law: str, has_line: bool) -> LatentModel | None:
