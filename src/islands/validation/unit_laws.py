@@ -42,27 +42,28 @@ _START = 1e-3
 _POINTS, _PLACES = 200, 21
 _SCALES = (0.5, 1.0, 2.0, 4.0, 8.0, 32.0)
 
-#: Name of each law, and the arguments at which it bends: they lie within the data, else it is another law.
+#: Name of each law, and the arguments at which it bends or turns: they lie within the data, else it is any
+#: smooth curve, or another law. A square root may begin beyond the data, as a level that is never zero.
 LAWS: Mapping[str, tuple[str, tuple[float, ...]]] = MappingProxyType(
     {
         "root": ("square root", ()),
-        "square": ("square", ()),
+        "square": ("square", (0.0,)),
         "s*abs": ("signed square", (0.0,)),
-        "cube": ("cube", ()),
+        "cube": ("cube", (0.0,)),
         "abs": ("absolute value", (0.0,)),
         "hinge": ("one-sided line", (0.0,)),
         "saturation": ("saturation", (-1.0, 1.0)),
         "dead zone": ("dead zone", (-1.0, 1.0)),
-        "tanh": ("smooth saturation (tanh)", ()),
-        "bell": ("bell (Gaussian)", ()),
+        "tanh": ("smooth saturation (tanh)", (0.0,)),
+        "bell": ("bell (Gaussian)", (0.0,)),
     }
 )
 
 #: Laws whose scale of the argument is a gain.
 _HOMOGENEOUS = frozenset({"root", "square", "s*abs", "cube", "abs", "hinge"})
 
-#: Laws that are others beside a line: a saturation, and a one-sided line.
-_WITHOUT_LINE = frozenset({"dead zone", "abs"})
+#: Laws that are others beside a line: a saturation, a one-sided line, and any smooth curve to second order.
+_WITHOUT_LINE = frozenset({"dead zone", "abs", "square"})
 
 #: Laws that are steps if they are steep, and their name then.
 _STEPS_IF_STEEP, _SIGN = frozenset({"saturation", "tanh"}), "sign (dry friction)"
