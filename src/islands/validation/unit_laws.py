@@ -21,7 +21,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.estimation.latent_models import transform_states
 from islands.estimation.latent_refit import refit_latent
+from islands.estimation.modal_form import find_modal_form
 from islands.models.latent import LatentModel
 from islands.models.unit_functions import evaluate_curve, parse_unit
 from islands.records.dataset import Dataset
@@ -86,11 +88,11 @@ class UnitLaw:
     law : str
         Name of the law.
     over : str
-        Name of the signal that the curve reads; empty if it is none of the record.
+        Name of the signal that the curve reads; behind "constant" if it does so at rest.
     unit : str
         Unit of this signal.
     places : tuple of float
-        Values of the signal at which the law bends or jumps; empty if it does not, or without a signal.
+        Values of the signal at which the law bends, turns, begins or jumps.
     has_line : bool
         Whether there is a line beside the law.
     deviation_percent : float
@@ -149,7 +151,7 @@ def name_unit_laws(model: LatentModel, split: Split, warm_up: int) -> tuple[Unit
     Returns
     -------
     tuple of UnitLaw
-        One for each curve that has a law.
+        One for each curve of a signal of the record that has a law.
 
     Raises
     ------
@@ -203,7 +205,7 @@ def _name(kept: _Candidate, curve: _Curve, split: Split, warm_up: int) -> UnitLa
     chosen = smallest[0]
     if chosen.name == _SIGN:  # The samples do not show how steep it is.
         return _describe(chosen, curve, split.estimation)
-    further = [_estimate(_append(chosen, curve, law), split, warm_up, chosen.has_line) for law in LAWS]
+    further = [_estimate(_append(chosen, law), split, warm_up, chosen.has_line) for law in LAWS]
     lack = _measure_lack([chosen, *(each for each in further if each is not None)], split)
     return _describe(chosen, curve, split.estimation) if lack[0] <= lack.min() + DECISIVE else None
 
@@ -233,10 +235,12 @@ def _measure(model: LatentModel, split: Split, warm_up: int, has_line: bool = Fa
     redundant = sum(each in _HOMOGENEOUS for each in model.units)
     size = measure_size(model) + operations - redundant
     (run,) = simulate_units(model, split.estimation, warm_up, np.array([model.parameters]))
-    return _Candidate(model, join_errors(*runs), size, _find_name(model, run, has_line), has_line, run)
+    return _Candidate(
+        model, join_errors(*runs), size, _find_name(model, run, split.estimation, has_line), has_line, run
+    )
 
 
-def _find_name(model: LatentModel, run: UnitRun, has_line: bool) -> str:
+def _find_name(model: LatentModel, run: UnitRun, record: Dataset, has_line: bool) -> str:
     """Return the name of the law that the last unit of a model is; empty if it bends outside of the data."""
     law = model.units[-1]
     if law not in LAWS or not run.output.size:
@@ -250,7 +254,8 @@ def _find_name(model: LatentModel, run: UnitRun, has_line: bool) -> str:
     if not all(low < each < high for each in bends):
         return ""
     if law in _STEPS_IF_STEEP and _is_step(model, run):
-        return _SIGN
+        abscissa, *_ = locate_arguments(model, len(model.units) - 1, run, record, ())
+        return _SIGN if abscissa is Abscissa.OUTPUT else ""
     return "" if _is_too_fast(model, run) else name
 
 
@@ -292,7 +297,9 @@ def _replace(model: LatentModel, curve: _Curve, law: str, has_line: bool) -> Lat
     read, values = np.flatnonzero(curve.weights), curve.values
     beside = linear[np.ix_(np.flatnonzero(curve.effect), read)]
     if has_line:
-        if law in _WITHOUT_LINE or not beside.all():
+        # Zeros between two modes are those of the coordinates.
+        others = np.flatnonzero(curve.effect)[:, None] >= order
+        if law in _WITHOUT_LINE or not (beside.astype(bool) | ~(others | (read >= order))).all():
             return None
     elif len(read) == 1 and read[0] >= order:
         # The part of the linear path along the effect of the curve belongs to the law.
@@ -305,7 +312,7 @@ def _replace(model: LatentModel, curve: _Curve, law: str, has_line: bool) -> Lat
     slope = sum(slopes)
     linear += slope * np.outer(curve.effect, curve.weights)
     shift = curve.rest + curve.effect * (constant + slope * curve.offset)
-    return _make_model(
+    found = _make_model(
         model,
         (*(model.units[unit] for unit in kept), law),
         {
@@ -321,20 +328,31 @@ def _replace(model: LatentModel, curve: _Curve, law: str, has_line: bool) -> Lat
             "level": blocks["level"] + shift[order:],
         },
     )
+    return _write_in_modes(found) if slope and read[0] < order else found
 
 
-def _append(candidate: _Candidate, curve: _Curve, law: str) -> LatentModel:
+def _write_in_modes(model: LatentModel) -> LatentModel | None:
+    """Return a model with one or two states for each mode, as those of a search; None if that fails."""
+    modes = find_modal_form(model.matrices["A"])
+    if modes is None:
+        return None
+    theta = transform_states(model.theta, model.layout, modes[1])
+    blocks = model.layout.split(theta)
+    blocks["A"][...] = modes[0]
+    return _make_model(model, model.units, blocks)
+
+
+def _append(candidate: _Candidate, law: str) -> LatentModel:
     """Return a model with a further function of the signal of its law, before it, with hardly an effect."""
-    model, of = candidate.model, candidate.model.matrices
+    model, of, arguments = candidate.model, candidate.model.matrices, candidate.run.arguments[-1]
     blocks = model.layout.split(model.theta)
-    low, high = float(curve.signal.min()), float(curve.signal.max())
+    low, high = float(arguments.min()), float(arguments.max())
     scale = 4.0 / ((high - low) or 1.0)
-    effect = _START * np.append(of["E"][:, -1], of["F"][-1])
     own = {
-        "E": effect[:-1, None],
-        "F": effect[-1:],
-        "W": scale * curve.weights[None],
-        "s": np.array([scale * (curve.offset - 0.5 * (low + high))]),
+        "E": _START * of["E"][:, -1:],
+        "F": _START * of["F"][-1:],
+        "W": scale * blocks["W"][-1:],
+        "s": scale * (of["s"][-1:] - 0.5 * (low + high)),
     }
     axes = {"E": 1, "F": 0, "W": 0, "s": 0}
     joined = {name: np.concatenate([own[name], blocks[name]], axis) for name, axis in axes.items()}
@@ -388,20 +406,21 @@ def _regress(
     return y - design @ solved, solved.tolist()
 
 
-def _describe(candidate: _Candidate, curve: _Curve, record: Dataset) -> UnitLaw:
+def _describe(candidate: _Candidate, curve: _Curve, record: Dataset) -> UnitLaw | None:
+    """Return the law of a curve; None of a signal that is none of the record."""
     model, run, law = candidate.model, candidate.run, candidate.model.units[-1]
     bends = (0.0,) if law == "root" or candidate.name == _SIGN else LAWS[law][1]
     abscissa, channel, places = locate_arguments(model, len(model.units) - 1, run, record, bends)
-    over, unit = "", ""
-    if abscissa is Abscissa.OUTPUT:
-        over, unit = record.output_name, record.output_unit
-    elif abscissa is not Abscissa.DEVIATION:
-        over, unit = model.column_names[channel], record.input_units[channel]
+    if abscissa is Abscissa.DEVIATION:
+        return None
+    over, unit = record.output_name, record.output_unit
+    if abscissa is not Abscissa.OUTPUT:
+        at_rest = "constant " * (abscissa is Abscissa.CONSTANT_INPUT)
+        over, unit = at_rest + model.column_names[channel], record.input_units[channel]
     # A free run may end early.
     size = min(run.output.size, curve.signal.size)
     columns = [np.ones(size), curve.signal[:size], evaluate_curve(law, run.arguments[-1][:size])]
     left, _ = _regress(curve.values[:size], columns)
     deviation = 100.0 * float(np.sqrt(np.mean(left**2)) / (np.ptp(curve.values) or 1.0))
     units = tuple(each + 1 for each in curve.units)
-    bent = tuple(sorted(places)) if over else ()
-    return UnitLaw(units, candidate.name, over, unit, bent, candidate.has_line, deviation)
+    return UnitLaw(units, candidate.name, over, unit, tuple(sorted(places)), candidate.has_line, deviation)

@@ -63,7 +63,7 @@ RESULTS = {
         *({}, LOST, {f"{METRICS}.free_run.rmse": 1e-12}, {"linear": None}),
         *({"data.noise": 1.0}, {"data.noise": None} | WHITE),
     ],
-    "essence_physics": [{}, {"models.0.laws": [LAW, LAW | {"units": (2, 3), "over": "", "places": ()}]}]
+    "essence_physics": [{}, {"models.0.laws": [LAW, LAW | {"units": (2, 3), "has_line": False}]}]
     + [
         {
             "record.units.output": "rad/s",
