@@ -10,7 +10,7 @@ from islands.models.latent import LatentModel, StateSpaceLayout
 from islands.records.dataset import Dataset
 from islands.records.split import split
 from islands.validation.unit_laws import name_unit_laws
-from support.latent_systems import make_model
+from support.latent_systems import SPRING, make_model, spring_record
 
 # The kernels of state spaces are compiled at their first use.
 pytestmark = pytest.mark.ci
@@ -19,6 +19,12 @@ NOISE, WARM_UP = 0.01, 20
 
 #: A lag behind a curve of the input: the state, the linear path and the unit.
 LAG = {"a1_1": 0.8, "b1": 0.01, "c1": 1.0, "e1_1": 0.3, "v1": 1.0, "s1": 0.01, "o1": 0.01, "level": 0.01}
+
+#: A spring with a place of its zero.
+SPRING_AND_PLACE = {
+    name: (SPRING | dict.fromkeys(("s1", "o1", "o2"), 1e-4))[name]
+    for name in (*list(SPRING)[:-1], "s1", "o1", "o2", "level")
+}
 
 
 def measure(law, feedback=np.zeros_like, seed=0):
@@ -81,3 +87,9 @@ def test_another_curve_has_no_law(law):
     ordered = {name: both[name] for name in StateSpaceLayout(1, 1, 2).names if name in both}
     for parameters, units in ((LAG, ("tanh",)), (ordered, ("tanh", "bell"))):
         assert name_unit_laws(fit(parts, parameters, *units), parts, WARM_UP) == ()
+
+
+def test_a_spring_is_a_cube_of_the_output():
+    parts = split(spring_record(1200, noise=0.01))
+    (found,) = name_unit_laws(make_model(SPRING_AND_PLACE), parts, WARM_UP)
+    assert (found.law, found.over, found.has_line) == ("cube", "y_mm", True)
