@@ -16,6 +16,7 @@ from islands.evolution.search_state import HistoryPoint
 from islands.evolution.settings import ACCURATE, FITNESS_MODES
 from islands.expressions.printing import plain_factor
 from islands.models.equations import equation
+from islands.models.form import is_linear, is_static
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
@@ -30,7 +31,6 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.evidence import is_linear, is_static
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import (
     Recommendation,

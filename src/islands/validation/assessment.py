@@ -29,6 +29,7 @@ from islands.validation.physics import PhysicsChecks, check_physics, missing_phy
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
 from islands.validation.prediction_bands import PredictionBands
 from islands.validation.residual_tests import ResidualTests, residual_tests
+from islands.validation.unit_laws import UnitLaw, name_unit_laws
 
 R = TypeVar("R")
 
@@ -84,6 +85,16 @@ class Checks:
         data = self._split.validation
         found = self._attempt(lambda: assess_residual(self._model, data, self._warm_up))
         return _missing_tests(found.reason) if isinstance(found, Failure) else found
+
+    @cached_property
+    def laws(self) -> tuple[UnitLaw, ...]:
+        """Laws of the curves of a latent model; see `name_unit_laws`."""
+        model = self._model
+        if not isinstance(model, LatentModel) or not model.units:
+            return ()
+        first = model.maximum_lag if self._warm_up is None else self._warm_up
+        found = self._attempt(lambda: name_unit_laws(model, self._split, first))
+        return () if isinstance(found, Failure) else found
 
     def _attempt(self, compute: Callable[[], R]) -> R | Failure:
         return Failure(self._missing) if self._missing else attempt(compute)

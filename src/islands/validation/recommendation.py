@@ -1,8 +1,7 @@
 """Choice of one model among the ranked models of a search, by their evidence.
 
-A difference of ten is very strong evidence (Kass & Raftery, J. American Statistical Association 90 (1995)
-773-795). Models that differ by less are equal: a linear one comes first, then the smallest. If the user
-prefers accuracy, the one with the most evidence comes first. See `islands.validation.evidence`.
+Models whose evidence differs by less than `DECISIVE` are equal: a linear one comes first, then the smallest.
+If the user prefers accuracy, the one with the most evidence comes first. See `islands.validation.evidence`.
 
 The measured data are the evidence. The physics checks simulate inputs that the record does not contain, and a
 system may diverge at them as its models do: a reaction that runs away, a spring that softens. The checks
@@ -17,14 +16,12 @@ from math import inf, isfinite, isnan
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
+from islands.models.form import is_linear, is_static
 from islands.models.narx import Model
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.evidence import ErrorNoise, count_terms, is_linear, is_static, measure_lack
+from islands.validation.evidence import DECISIVE, ErrorNoise, count_terms, measure_lack
 from islands.validation.physics import PhysicsChecks
-
-#: Difference of the evidence of two models that do not count as equal.
-DECISIVE = 10.0
 
 #: Reasons to exclude models, in the order of the criteria.
 DIVERGENCE = "validation-divergence"

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
+from islands.models.form import is_linear, is_static
 from islands.models.protocol import DynamicModel
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import is_linear, is_static
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 from islands.validation.recommendation import (
     CHECKS,

@@ -20,6 +20,7 @@ from islands.facade.library_fit import LibraryFit, fit_library
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData, prepare_data
 from islands.facade.trials.static_selection import STATIC, find_static
+from islands.models.form import is_static, name_form
 from islands.progress import Steps, StoppedError
 from islands.records.averaging import AUTO as AUTO_AVERAGE
 from islands.records.dataset import Dataset
@@ -28,7 +29,6 @@ from islands.records.inspection.rest import check_rest
 from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import is_static, name_form
 from islands.validation.recommendation import recommend
 from islands.validation.recommendation_reasons import describe_exclusion, list_rivals
 
