@@ -54,7 +54,9 @@ def refit_latent(
     for begin, end in record.bounds:
         u, late = read_inputs(record, model, begin, end)
         y = scales.scale_outputs(record.y[begin + late : end])
-        segments.append(Segment(scales.scale_inputs(u), y, *scaled_limits))
+        u = scales.scale_inputs(u)
+        u.setflags(write=False)  # as inputs of a record: kernels are compiled for each type
+        segments.append(Segment(u, y, *scaled_limits))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
     conditions = scales.scale_conditions(stated)
