@@ -59,7 +59,7 @@ STEPS = {
     "prediction bands": (search_result, "calibrate_bands"),
     "bounds of the errors of all models": (SubsetSearch, "certify"),
     "estimation by the error of the free run": (islands.facade.library_fit, "refine_models"),
-    "estimation of the parameters on all data": (refit, "_estimate"),
+    "estimation of the parameters on all data": (refit, "refit"),
     "residual tests": (assessment, "assess_residual"),
     "physics checks": (assessment, "check_physics"),
     "facts about the data": (islands.report.documents.result_folder, "measure_output_noise"),

@@ -18,5 +18,6 @@ def with_changes(entry, physics=None, residual_tests=None, residual_structure=No
         physics=physics or entry.physics,
         residual=residual,
         has_estimated_start=entry.has_estimated_start,
+        laws=entry.checks.laws,
     )
     return replace(entry, checks=checks, **changes)

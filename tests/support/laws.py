@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.expressions.parsing import parse
+from islands.models.form import is_linear
 from islands.models.latent import LatentModel
 from islands.models.narx import Model, make_model
 from islands.models.protocol import DynamicModel
 from islands.program.regressor_matrix import regressor_matrix
 from islands.records.dataset import Dataset
 from islands.simulation.predictors import free_run
-from islands.validation.evidence import is_linear
 
 #: Sampling time of all records in seconds.
 DT = 0.05

@@ -20,11 +20,11 @@ from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands.models.equations import named_equation
+from islands.models.form import name_form
 from islands.models.latent import LatentModel
 from islands.models.narx import require_narx
 from islands.records.channel_names import parse_channel_name
 from islands.records.input_lead import advance_all_inputs
-from islands.validation.evidence import name_form
 from islands_service.domain.free_runs import SearchFreeRun, simulate_searched
 from islands_service.runtime import ClusterError
 

@@ -122,9 +122,9 @@ def _begin(model: LatentModel, delays: tuple[int, ...], data: LatentData) -> Dra
     blocks["o"] -= decay @ rest
     blocks["level"] += blocks["C"] @ rest
     if model.order <= _LARGEST_FULL:
-        balanced = _transform(theta, layout, find_balanced_form(blocks["A"], blocks["B"], blocks["C"]))
+        balanced = transform_states(theta, layout, find_balanced_form(blocks["A"], blocks["B"], blocks["C"]))
         scales = measure_deviations(balanced, model.codes, late.used[0].u, np.zeros(model.order))
-        theta = balanced if scales is None else _transform(balanced, layout, np.diag(scales))
+        theta = balanced if scales is None else transform_states(balanced, layout, np.diag(scales))
         free = np.ones(theta.size, bool)
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in late.used])
     return Draft(layout, (), theta, free, states, _LINEAR_STEPS, delays=delays if any(delays) else ())
@@ -307,7 +307,7 @@ def _write_in_modes(
     if found is None:
         return theta
     blocks, forward = found
-    modal = _transform(theta, layout, forward)
+    modal = transform_states(theta, layout, forward)
     layout.split(modal)["A"][...] = blocks
     first = np.linalg.solve(forward, start).astype(np.float64)
     scales = measure_deviations(modal, find_codes(units), u, first)
@@ -316,12 +316,12 @@ def _write_in_modes(
     for state, next_state in pairwise(range(layout.order)):
         if blocks[state, next_state]:  # both states of a pair have one scale
             scales[[state, next_state]] = np.hypot(*scales[[state, next_state]])
-    scaled = _transform(modal, layout, np.diag(scales))
+    scaled = transform_states(modal, layout, np.diag(scales))
     layout.split(scaled)["A"][...] = blocks
     return scaled if np.isfinite(scaled).all() else theta
 
 
-def _transform(
+def transform_states(
     theta: NDArray[np.float64], layout: StateSpaceLayout, forward: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the parameters for the states z of ``x = T z``."""

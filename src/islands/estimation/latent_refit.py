@@ -11,7 +11,7 @@ from islands.estimation.latent_data import SignalScales, estimate_start
 from islands.estimation.state_space_fit import StateSpaceFit
 from islands.models.latent import LatentModel
 from islands.records.dataset import Dataset
-from islands.records.flat_extremes import find_limits
+from islands.records.flat_extremes import SensorLimits, find_limits
 from islands.simulation.initial_states import Segment, read_inputs
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.segment_lanes import SegmentLanes
@@ -26,7 +26,8 @@ def refit_latent(
 ) -> LatentModel | EvaluationOutcome:
     """Estimate the parameters of a model by the error of the free run of each recording of a record.
 
-    The limits of the sensor become those of the record, which may be beyond those of the estimation data.
+    The limits of the sensor become those of the record, which may be beyond those of the estimation data; a
+    model without a limit gets none.
 
     Parameters
     ----------
@@ -45,14 +46,17 @@ def refit_latent(
     offsets = {*layout.blocks["o"], *layout.blocks["s"]} <= {*model.wiring}
     scales = SignalScales.measure(record, offsets=offsets, level="level" in model.wiring)
     theta = scales.use_scaled_units(layout, model.theta)
-    limits = find_limits(record.y, record.bounds)
+    pairs = zip(model.limits, find_limits(record.y, record.bounds), strict=True)
+    limits = SensorLimits(*(new if old is not None else None for old, new in pairs))
     limits = limits.mirror(record.y) if stated.is_odd else limits
     scaled_limits = scales.scale_limits(limits)
     segments = []
     for begin, end in record.bounds:
         u, late = read_inputs(record, model, begin, end)
         y = scales.scale_outputs(record.y[begin + late : end])
-        segments.append(Segment(scales.scale_inputs(u), y, *scaled_limits))
+        u = scales.scale_inputs(u)
+        u.setflags(write=False)  # as inputs of a record: kernels are compiled for each type
+        segments.append(Segment(u, y, *scaled_limits))
     states = np.array([estimate_start(theta, model.codes, each, model.order) for each in segments])
     free = np.isin(layout.names, model.wiring)
     conditions = scales.scale_conditions(stated)

@@ -16,6 +16,7 @@ from islands.evolution.search_state import HistoryPoint
 from islands.evolution.settings import ACCURATE, FITNESS_MODES
 from islands.expressions.printing import plain_factor
 from islands.models.equations import equation
+from islands.models.form import is_linear, is_static
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
 from islands.models.protocol import DynamicModel
@@ -30,7 +31,6 @@ from islands.records.split import Split
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.evidence import is_linear, is_static, measure_size
 from islands.validation.prediction_bands import calibrate_bands
 from islands.validation.recommendation import (
     Recommendation,
@@ -176,10 +176,9 @@ class SearchResult:
             mode = FITNESS_MODES[self.settings["fitness"]]
             found = recommend_fittest(self.models, mode)
             return replace(found, reasons=state_fit(self.models[found.rank - 1], mode, hysteresis, unit))
-        sizes = [measure_size(entry.model) for entry in self.models]
         accurate = self.settings.get("prefer") == ACCURATE
-        found = recommend(sizes, self.models, hysteresis, accurate)
-        return replace(found, reasons=state_reasons(found, sizes, self.models, hysteresis, unit, accurate))
+        found = recommend(self.models, hysteresis, accurate)
+        return replace(found, reasons=state_reasons(found, self.models, hysteresis, unit, accurate))
 
     @property
     def recommended(self) -> Assessment:
@@ -436,7 +435,7 @@ def rank_models(models: Sequence[Assessment]) -> tuple[Assessment, ...]:
 def take_recommended(models: Sequence[Assessment]) -> Assessment:
     """Return the recommended one of some models of the same data, at least one; see `recommend`."""
     ranked = rank_models(models)
-    return ranked[recommend([measure_size(each.model) for each in ranked], ranked, False).rank - 1]
+    return ranked[recommend(ranked, False).rank - 1]
 
 
 def keep_best_of_sizes(models: Sequence[Assessment]) -> tuple[Assessment, ...]:

@@ -152,6 +152,11 @@ class StateSpace:
         return len(self.A)
 
     @property
+    def is_static(self) -> bool:
+        """Whether the outputs depend on the inputs of the same time only."""
+        return not (self.order or any(self.dead_times))
+
+    @property
     def is_continuous(self) -> bool:
         """Whether the system is a differential equation."""
         return self.dt == 0.0

@@ -5,7 +5,7 @@ estimation data, a model is judged by an extrapolation where the validation data
 the estimation data hardly excite is then punished for parameters that they do not determine.
 """
 
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 from islands.estimation.estimator_table import Criterion
 from islands.estimation.refit import refit
 from islands.models.protocol import DynamicModel
+from islands.progress import Failure, attempt
 from islands.records.split import Split, join_parts
 from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.validation.evidence import join_errors
+from islands.validation.evidence import join_errors, mean_square
 
 
 class AllDataFit:
     """Estimate of the parameters of a model on estimation data and validation data together.
 
-    The parameters stay if their errors on all data are smaller than those of the estimate: least squares does
-    not minimise the error of the free run. Both attributes are computed when they are first read.
+    The parameters stay if they cannot be estimated again, or if their errors on all data are smaller than those
+    of the estimate: least squares does not minimise the error of the free run. Both attributes are computed when they are first read.
 
     Parameters
     ----------
@@ -60,11 +61,12 @@ class AllDataFit:
         if self._criterion is None:
             return given
         record = join_parts(self._split)
-        estimated = refit(self._given, self._criterion, record, self._constraints, self._warm_up)
-        if isinstance(estimated, EvaluationOutcome):
+        arguments = self._given, self._criterion, record, self._constraints, self._warm_up
+        estimated = attempt(partial(refit, *arguments))
+        if isinstance(estimated, Failure | EvaluationOutcome):
             return given
         found = estimated, self._measure(estimated)
-        return min(found, given, key=lambda each: float(np.nanmean(each[1] ** 2)))
+        return min(found, given, key=lambda each: mean_square(each[1]))
 
     def _measure(self, model: DynamicModel) -> NDArray[np.float64]:
         parts = (self._split.estimation, self._split.validation)

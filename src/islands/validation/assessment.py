@@ -19,16 +19,17 @@ from islands.models.protocol import DynamicModel
 from islands.progress import Failure, attempt
 from islands.records.dataset import Dataset
 from islands.records.split import Split
-from islands.rounding import RESOLUTION
 from islands.simulation.initial_outputs import has_estimated_start, simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.all_data_fit import AllDataFit
+from islands.validation.evidence import mean_square, measure_size
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
 from islands.validation.prediction_bands import PredictionBands
 from islands.validation.residual_tests import ResidualTests, residual_tests
+from islands.validation.unit_laws import UnitLaw, name_unit_laws
 
 R = TypeVar("R")
 
@@ -84,6 +85,16 @@ class Checks:
         data = self._split.validation
         found = self._attempt(lambda: assess_residual(self._model, data, self._warm_up))
         return _missing_tests(found.reason) if isinstance(found, Failure) else found
+
+    @cached_property
+    def laws(self) -> tuple[UnitLaw, ...]:
+        """Laws of the curves of a latent model; see `name_unit_laws`."""
+        model = self._model
+        if not isinstance(model, LatentModel) or not model.units:
+            return ()
+        first = model.maximum_lag if self._warm_up is None else self._warm_up
+        found = self._attempt(lambda: name_unit_laws(model, self._split, first))
+        return () if isinstance(found, Failure) else found
 
     def _attempt(self, compute: Callable[[], R]) -> R | Failure:
         return Failure(self._missing) if self._missing else attempt(compute)
@@ -184,6 +195,11 @@ class Assessment:
         return self.refit.constraints if self.refit else self.constraints
 
     @property
+    def size(self) -> float:
+        """Number of terms by which the model is compared; see `measure_size`."""
+        return measure_size(self.model)
+
+    @property
     def validation_error(self) -> float:
         """RMSE of the free run on the validation data; infinite if it diverges."""
         error = self.metrics["validation"]["free_run"].rmse
@@ -196,11 +212,8 @@ class Assessment:
 
     @property
     def mean_square(self) -> float:
-        """Mean square of these errors.
-
-        Those below the resolution of files are equal; infinite after a divergence.
-        """
-        return max(float(np.nanmean(self.errors**2)), RESOLUTION**2)
+        """Mean square of these errors; infinite after a divergence."""
+        return mean_square(self.errors)
 
     @property
     def split(self) -> Split:

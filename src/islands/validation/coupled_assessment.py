@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from islands.models.coupled_narx import CoupledModel
 from islands.records.coupled import CoupledRecord, CoupledSplit
-from islands.rounding import RESOLUTION
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.validation.assessment import PARTS
-from islands.validation.evidence import join_errors
+from islands.validation.evidence import join_errors, mean_square
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import OutputBands
@@ -95,12 +94,8 @@ class CoupledAssessment:
 
     @property
     def mean_square(self) -> float:
-        """Geometric mean over the outputs of the mean squared error of the common free run on all data.
-
-        Errors below the resolution of files are equal; infinite after a divergence.
-        """
-        squares = np.maximum(np.nanmean(self.errors**2, axis=0), RESOLUTION**2)
-        return float(np.exp(np.mean(np.log(squares))))
+        """Geometric mean over the outputs of the mean squared error of the common free run on all data."""
+        return mean_square(self.errors)
 
     def measure_residual(self, place: int) -> ResidualStructure:
         """Measure the residuals of an output on the longest recording of the validation data."""

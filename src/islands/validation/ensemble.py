@@ -31,7 +31,14 @@ from islands.simulation.initial_outputs import LEAST_SHARE, estimate_initial_out
 from islands.simulation.predictors import free_run, free_runs
 from islands.validation.all_data_fit import AllDataFit
 from islands.validation.equal_laws import find_laws
-from islands.validation.evidence import ErrorNoise, count_terms, join_errors, measure_lack, measure_size
+from islands.validation.evidence import (
+    ErrorNoise,
+    count_terms,
+    join_errors,
+    mean_square,
+    measure_lack,
+    measure_size,
+)
 
 M = TypeVar("M", bound=AnyModel)
 
@@ -335,7 +342,7 @@ def _weigh(
         return []
     models = [_fit_all_data(candidate, split, constraints, warm_up) for candidate in candidates]
     errors = [_measure_errors(model, split, warm_up) for model in models]
-    closest = min(errors, key=lambda each: float(np.nanmean(each**2)))
+    closest = min(errors, key=mean_square)
     noise = ErrorNoise.fit(closest, split.segments)
     squares = [noise.measure(each) for each in errors]
     sizes, terms = [measure_size(model) for model in models], count_terms(models)
@@ -371,8 +378,7 @@ def measure_square(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -
 
     With several outputs, it is the geometric mean of their errors. Infinite after a divergence.
     """
-    squares = np.nanmean(_measure_errors(model, split, warm_up) ** 2, axis=0)
-    return float(np.exp(np.mean(np.log(squares + ROUNDING**2))))
+    return mean_square(_measure_errors(model, split, warm_up))
 
 
 def _measure_errors(

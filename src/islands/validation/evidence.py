@@ -15,66 +15,22 @@ from math import inf, log
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from islands.expressions.tree import Constant, Lagged
+from islands.expressions.tree import Constant
 from islands.models.coupled_narx import AnyModel, CoupledModel
+from islands.models.form import is_linear
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
-from islands.records.channel_names import parse_channel_name
 from islands.records.coupled import AnyRecord, CoupledRecord
 from islands.records.noise_model import NoiseModel, fit_noise, white_noise
 from islands.records.segments import count_runs
 from islands.rounding import RESOLUTION
 from islands.simulation.predictors import Simulation
 
+#: Difference of the evidence of two models that do not count as equal: very strong evidence (Kass & Raftery,
+#: J. American Statistical Association 90 (1995) 773-795).
+DECISIVE = 10.0
+
 _ONE = Constant(1.0)
-
-
-def is_linear(model: AnyModel) -> bool:
-    """Return whether the next output of a model is linear in its inputs and its states."""
-    if isinstance(model, CoupledModel):
-        return all(map(is_linear, model.models))
-    if isinstance(model, LatentModel):
-        return not model.units
-    return isinstance(model, Model) and all(
-        isinstance(item.expression, Lagged | Constant) for item in model.regressors
-    )
-
-
-def is_static(model: AnyModel) -> bool:
-    """Return whether the output of a model depends on the inputs of the same sample only, and on one."""
-    if isinstance(model, CoupledModel):
-        return all(map(is_static, model.models))
-    if isinstance(model, LatentModel):
-        return not model.order and not any(model.delays) and reads_inputs(model)
-    if not isinstance(model, Model):
-        return False
-    now = {(place, 1) for place, name in enumerate(model.input_names, 1) if parse_channel_name(name).at_once}
-    lags = {each for item in model.regressors for each in item.lags}
-    return bool(lags) and lags <= now
-
-
-def name_form(model: AnyModel) -> str:
-    """Return the form of a model.
-
-    It is ``static``, ``linear``, ``curve`` (linear with one), ``equation`` or ``state space``.
-    """
-    if is_static(model):
-        return "static"
-    if is_linear(model):
-        return "linear"
-    if isinstance(model, LatentModel):
-        return "curve" if len(model.units) == 1 else "state space"
-    return "equation"
-
-
-def reads_inputs(model: AnyModel) -> bool:
-    """Return whether the output of a model depends on an input."""
-    if isinstance(model, CoupledModel):
-        return any(map(reads_inputs, model.models))
-    if isinstance(model, LatentModel):
-        blocks = model.layout.split(model.theta)
-        return any(block.any() for block in (blocks["B"], blocks["D"], blocks["W"][:, model.order :]))
-    return isinstance(model, Model) and any(channel for item in model.regressors for channel, _ in item.lags)
 
 
 def measure_size(model: AnyModel) -> float:
@@ -110,6 +66,21 @@ def join_errors(*parts: tuple[AnyRecord, Simulation]) -> NDArray[np.float64]:
         ranges if isinstance(first, CoupledRecord) else ranges[0]
     )
     return relative
+
+
+def mean_square(errors: NDArray[np.float64]) -> float:
+    """Return the mean square of errors; infinite after a divergence.
+
+    Errors below the resolution of files are equal. With several outputs, it is the geometric mean: the
+    likelihood of independent normal errors with unknown variances depends on it.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (samples,) or (samples, outputs)
+        As of `join_errors`.
+    """
+    squares = np.nanmean(np.square(errors), axis=0)
+    return float(np.exp(np.mean(np.log(np.maximum(squares, RESOLUTION**2)))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

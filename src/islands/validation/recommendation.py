@@ -1,8 +1,7 @@
 """Choice of one model among the ranked models of a search, by their evidence.
 
-A difference of ten is very strong evidence (Kass & Raftery, J. American Statistical Association 90 (1995)
-773-795). Models that differ by less are equal: a linear one comes first, then the smallest. If the user
-prefers accuracy, the one with the most evidence comes first. See `islands.validation.evidence`.
+Models whose evidence differs by less than `DECISIVE` are equal: a linear one comes first, then the smallest.
+If the user prefers accuracy, the one with the most evidence comes first. See `islands.validation.evidence`.
 
 The measured data are the evidence. The physics checks simulate inputs that the record does not contain, and a
 system may diverge at them as its models do: a reaction that runs away, a spring that softens. The checks
@@ -17,14 +16,12 @@ from math import inf, isfinite, isnan
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
+from islands.models.form import is_linear, is_static
 from islands.models.narx import Model
 from islands.validation.assessment import Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
-from islands.validation.evidence import ErrorNoise, count_terms, is_linear, is_static, measure_lack
+from islands.validation.evidence import DECISIVE, ErrorNoise, count_terms, measure_lack
 from islands.validation.physics import PhysicsChecks
-
-#: Difference of the evidence of two models that do not count as equal.
-DECISIVE = 10.0
 
 #: Reasons to exclude models, in the order of the criteria.
 DIVERGENCE = "validation-divergence"
@@ -93,12 +90,7 @@ class _Selection:
             self.excluded.append(Exclusion(reason, tuple(at + 1 for at in others)))
 
 
-def recommend(
-    sizes: Sequence[float],
-    assessments: Sequence[Assessment],
-    hysteresis: bool,
-    accurate: bool = False,
-) -> Recommendation:
+def recommend(assessments: Sequence[Assessment], hysteresis: bool, accurate: bool = False) -> Recommendation:
     """Choose the simplest of the models with the most evidence.
 
     Candidates are the models whose free run on the validation data is bounded and, if the search constrains
@@ -109,8 +101,6 @@ def recommend(
 
     Parameters
     ----------
-    sizes : sequence of float
-        Numbers of terms as of `measure_size`, in the order of the ranks.
     assessments : sequence of Assessment
         Assessments on the same estimation data and validation data, best first.
     hysteresis : bool
@@ -130,7 +120,7 @@ def recommend(
     if sound:
         selection.keep(CHECKS, [at for at in selection.left if at in sound or at < sound[0]])
     terms = count_terms([entry.model for entry in assessments])
-    lack = _measure_lack(selection.left, sizes, assessments, terms)
+    lack = _measure_lack(selection.left, assessments, terms)
     reference = min(selection.left, key=lambda at: (lack[at], at))
     limit = lack[reference] + DECISIVE
     selection.keep(EVIDENCE, [at for at in selection.left if lack[at] <= limit])
@@ -138,7 +128,7 @@ def recommend(
     chosen = (
         min(selection.left, key=lambda at: (lack[at], at))
         if accurate
-        else _take_simplest(selection.left, sizes, assessments, lack)
+        else _take_simplest(selection.left, assessments, lack)
     )
     return Recommendation(chosen + 1, (), reference + 1, tuple(selection.excluded))
 
@@ -157,11 +147,10 @@ def recommend_joint(assessments: Sequence[CoupledAssessment], terms: int) -> Cou
     bounded = [at for at, entry in enumerate(assessments) if isfinite(entry.mean_square)]
     if not bounded:
         return assessments[0]
-    sizes = [entry.size for entry in assessments]
-    lack = _measure_lack(bounded, sizes, assessments, terms)
+    lack = _measure_lack(bounded, assessments, terms)
     limit = min(lack.values()) + DECISIVE
     equal = [at for at in bounded if lack[at] <= limit]
-    return assessments[_take_simplest(equal, sizes, assessments, lack)]
+    return assessments[_take_simplest(equal, assessments, lack)]
 
 
 def measure_squares(assessments: Sequence[Comparable]) -> tuple[list[float], int]:
@@ -194,10 +183,7 @@ def _identify(entry: Comparable) -> object:
 
 
 def _take_simplest(
-    places: Sequence[int],
-    sizes: Sequence[float],
-    assessments: Sequence[Comparable],
-    lack: Mapping[int, float],
+    places: Sequence[int], assessments: Sequence[Comparable], lack: Mapping[int, float]
 ) -> int:
     """Return the linear one of models with as much evidence, or a static one, or the smallest.
 
@@ -206,21 +192,19 @@ def _take_simplest(
     """
 
     def rank(at: int) -> tuple[bool, bool, bool, float, float, int]:
-        model = assessments[at].model
+        model, size = assessments[at].model, assessments[at].size
         linear, static = is_linear(model), is_static(model)
-        return not linear, not static, linear and isinstance(model, Model), sizes[at], lack[at], at
+        return not linear, not static, linear and isinstance(model, Model), size, lack[at], at
 
     return min(places, key=rank)
 
 
-def _measure_lack(
-    places: Sequence[int], sizes: Sequence[float], assessments: Sequence[Comparable], terms: int
-) -> dict[int, float]:
+def _measure_lack(places: Sequence[int], assessments: Sequence[Comparable], terms: int) -> dict[int, float]:
     """Return the information criteria of some models, which have a bounded free run."""
     compared = [assessments[at] for at in places]
     squares, samples = measure_squares(compared)
-    models, own = [entry.model for entry in compared], [sizes[at] for at in places]
-    lack = measure_lack(models, own, squares, samples, terms)
+    models, sizes = [entry.model for entry in compared], [entry.size for entry in compared]
+    lack = measure_lack(models, sizes, squares, samples, terms)
     return dict(zip(places, lack.tolist(), strict=True))
 
 

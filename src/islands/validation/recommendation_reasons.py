@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
+from islands.models.form import is_linear, is_static
 from islands.models.protocol import DynamicModel
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import is_linear, is_static
 from islands.validation.physics import EXCURSIONS, LEVELS, PhysicsChecks
 from islands.validation.recommendation import (
     CHECKS,
@@ -25,7 +25,6 @@ _STILL = 0.01
 
 def state_reasons(
     found: Recommendation,
-    sizes: Sequence[float],
     assessments: Sequence[Assessment],
     hysteresis: bool,
     unit: str = "",
@@ -36,7 +35,7 @@ def state_reasons(
     Parameters
     ----------
     found : Recommendation
-    sizes, assessments, hysteresis, accurate
+    assessments, hysteresis, accurate
         As for `recommend`.
     unit : str
         Unit of the output.
@@ -45,7 +44,7 @@ def state_reasons(
         return ("the free run of every model diverges; this one has the least one-step-ahead error",)
     choice = (
         _describe_static(assessments[found.rank - 1].model),
-        _describe_choice(found, sizes, assessments, unit, accurate),
+        _describe_choice(found, assessments, unit, accurate),
     )
     reasons = "; ".join(filter(None, choice)), _describe_physics(found, assessments, hysteresis, unit)
     return tuple(filter(None, reasons))
@@ -71,9 +70,7 @@ def state_fit(entry: Assessment, mode: str, hysteresis: bool, unit: str = "") ->
     return tuple(filter(None, (reason, checks)))
 
 
-def list_rivals(
-    found: Recommendation, sizes: Sequence[float], assessments: Sequence[Assessment]
-) -> tuple[Exclusion, ...]:
+def list_rivals(found: Recommendation, assessments: Sequence[Assessment]) -> tuple[Exclusion, ...]:
     """Return the excluded models that would be preferred without the reason that excludes them.
 
     They lack Property 1 and have a smaller error than the reference, or they fail the physics checks and are
@@ -81,12 +78,12 @@ def list_rivals(
     """
     if found.reference is None:
         return ()
-    best, size = assessments[found.reference - 1], sizes[found.rank - 1]
+    best, chosen = (assessments[rank - 1] for rank in (found.reference, found.rank))
 
     def is_rival(reason: str, rank: int) -> bool:
         if reason == PROPERTY_1:
             return assessments[rank - 1].validation_error < best.validation_error
-        return reason == CHECKS and sizes[rank - 1] < size
+        return reason == CHECKS and assessments[rank - 1].size < chosen.size
 
     rivals = (
         replace(each, ranks=tuple(rank for rank in each.ranks if is_rival(each.reason, rank)))
@@ -119,7 +116,6 @@ def _describe_static(model: DynamicModel) -> str:
 
 def _describe_choice(
     found: Recommendation,
-    sizes: Sequence[float],
     assessments: Sequence[Assessment],
     unit: str,
     accurate: bool,
@@ -130,7 +126,7 @@ def _describe_choice(
     criterion = "information criterion of the free run on all data"
     rivals = [
         f"{_write_models(each.ranks, assessments, unit)} {describe_exclusion(each, assessments)}"
-        for each in list_rivals(found, sizes, assessments)
+        for each in list_rivals(found, assessments)
     ]
     end = f"; left out: {' and '.join(rivals)}" if rivals else ""
     if chosen is best or accurate:

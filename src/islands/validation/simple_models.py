@@ -6,11 +6,11 @@ from islands.estimation.estimator_table import BOX_JENKINS, refinement_criterion
 from islands.estimation.linear.latent import identify_linear_model
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.static_models import identify_static_models
+from islands.models.form import is_linear
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.split import Split
 from islands.validation.assessment import Assessment, assess
-from islands.validation.evidence import is_linear
 
 #: Error that the parameters of a static model minimise: it has no memory, so that all are one.
 _STATIC = refinement_criterion(None)

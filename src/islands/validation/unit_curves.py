@@ -122,6 +122,26 @@ def trace_unit_curves(
     return tuple(_trace(unit, models, runs, beyond, variation) for unit in range(len(model.units)))
 
 
+def locate_arguments(
+    model: LatentModel, unit: int, run: UnitRun, record: Dataset, arguments: Sequence[float]
+) -> tuple[Abscissa, int, tuple[float, ...]]:
+    """Return the abscissa of a unit, the number of its input, and the abscissas of some arguments.
+
+    Parameters
+    ----------
+    model : LatentModel
+    unit : int
+        Place of the unit, from 0.
+    run : UnitRun
+        Free run of the model on a record.
+    record : Dataset
+    arguments : sequence of float
+    """
+    abscissa, channel = _choose_abscissa(model, unit, run, record.u.std(axis=0))
+    scale, offset = _scale_argument(model, unit, abscissa, channel, run)
+    return abscissa, channel, tuple((each - offset) / scale for each in arguments)
+
+
 def _find_members(model: LatentModel, ensemble: Ensemble | None) -> NDArray[np.float64]:
     """Return the parameters of the members with the structure of a model; none if they are too few."""
     structures = () if ensemble is None else ensemble.structures

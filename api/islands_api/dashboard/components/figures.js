@@ -6,6 +6,7 @@ import { makeFileLinks } from "./figure_files.js";
 
 const TITLES = {
   "free-run": "Free run",
+  "static-curve": "Output over the inputs",
   structure: "Structure",
   curves: "Curves of the units",
   bode: "Frequency response",

@@ -249,7 +249,8 @@ function makeDetail(job, model, { hysteresis, names }, signal) {
     makeExportRow(path, model.rank),
     ...parameters,
     makeGallery(path, signal),
-    makeLinearSystem(path, job.spec, signal),
+    // A static model has no poles, and no response to a step.
+    ...(model.form === "static" ? [] : [makeLinearSystem(path, job.spec, signal)]),
     ...(names ? [makeScenarioUpload(path, job.spec.output, signal)] : []),
   ];
 }

@@ -16,7 +16,7 @@ from islands.facade.identification_progress import class_phases, fit_phases
 from islands.progress import PhasedProgress, Steps
 from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading.options import ReadingOptions
-from islands.report.figures.names import FREE_RUN, parse_figures
+from islands.report.figures.names import OVERVIEW_TEXT, parse_figures
 
 
 @with_settings
@@ -34,7 +34,7 @@ def fit(
     changes: Annotated[Given, FitSettings],
     seed: options.Seed = 0,
     force: options.Force = False,
-    figures: options.Figures = FREE_RUN,
+    figures: options.Figures = OVERVIEW_TEXT,
 ) -> None:
     """Fit small models to recordings of a system by subset selection and least squares, and assess them."""
     check_folder(out, force)

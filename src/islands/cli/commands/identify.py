@@ -16,7 +16,7 @@ from islands.evolution.settings import Settings
 from islands.records.preprocessing_steps import PreprocessingSteps
 from islands.records.reading import fingerprint
 from islands.records.reading.options import ReadingOptions
-from islands.report.figures.names import FREE_RUN, parse_figures
+from islands.report.figures.names import OVERVIEW_TEXT, parse_figures
 
 #: Options of the run rather than of the search: allowed with ``--resume``.
 RUN_OPTIONS = ("resume", "figures", GIVEN, *(field.name for field in fields(RunSettings)))
@@ -50,7 +50,7 @@ def identify(
     run_settings: RunSettings,
     force: options.Force = False,
     resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to continue.")] = None,
-    figures: options.Figures = FREE_RUN,
+    figures: options.Figures = OVERVIEW_TEXT,
 ) -> None:
     """Identify recordings of a system by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
     run_options = RunOptions(run_settings, parse_figures(figures))

@@ -20,6 +20,7 @@ from islands.facade.library_fit import LibraryFit, fit_library
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData, prepare_data
 from islands.facade.trials.static_selection import STATIC, find_static
+from islands.models.form import is_static, name_form
 from islands.progress import Steps, StoppedError
 from islands.records.averaging import AUTO as AUTO_AVERAGE
 from islands.records.dataset import Dataset
@@ -28,7 +29,6 @@ from islands.records.inspection.rest import check_rest
 from islands.records.split import Split
 from islands.rounding import RESOLUTION
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import is_static, measure_size, name_form
 from islands.validation.recommendation import recommend
 from islands.validation.recommendation_reasons import describe_exclusion, list_rivals
 
@@ -359,14 +359,13 @@ def recommend_kind(compared: Mapping[str, Assessment], errors: Mapping[str, floa
         Their errors; see `measure_share`.
     """
     kinds, models = list(compared), list(compared.values())
-    sizes = [measure_size(each.model) for each in models]
-    best = recommend(sizes, models, False)
+    best = recommend(models, False)
     kind = kinds[best.rank - 1]
     is_least = errors[kind] == min(errors.values()) or best.rank == best.reference
     smallest = "" if is_least else ", the simplest with as much evidence,"
     left_out = [
         f"{' and '.join(kinds[rank - 1] for rank in each.ranks)} {describe_exclusion(each, models)}"
-        for each in list_rivals(best, sizes, models)
+        for each in list_rivals(best, models)
     ]
     return kind, (
         f"the free-run RMSE of its recommended model{smallest} on the validation data is "

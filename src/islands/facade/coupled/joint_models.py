@@ -48,9 +48,9 @@ from islands.report.documents.result_folder import record_document
 from islands.rounding import RESOLUTION
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble, EnsembleStructure, ValidatedModel, make_ensemble
-from islands.validation.evidence import measure_lack, measure_size
+from islands.validation.evidence import DECISIVE, measure_lack, measure_size
 from islands.validation.prediction_bands import OutputBands, calibrate_output_bands
-from islands.validation.recommendation import DECISIVE, recommend_joint
+from islands.validation.recommendation import recommend_joint
 
 #: The linear model is estimated by the error of the free run.
 _CRITERION = refinement_criterion(None)

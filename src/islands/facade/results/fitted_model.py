@@ -223,9 +223,10 @@ class FittedModel:
 
     @property
     def linear_system(self) -> StateSpace | None:
-        """Linear system about the operating point of `linearise`; None of a model that has none there."""
+        """Linear system about the operating point of `linearise`; None without one, and of a static model."""
         with suppress(ModelError):
-            return self.linearise()
+            found = self.linearise()
+            return None if found.is_static else found
         return None
 
     def plot_linear(
@@ -487,8 +488,8 @@ class FittedModel:
         ----------
         kind : str
             A key of ``islands.report.figures.registry.FIGURES``: ``free-run`` (or ``free_run``, as in
-            ``metrics``), ``loop``, ``hold``, ``residuals``; of latent models ``structure`` and ``curves``; or
-            one of `plot_linear`, which needs no record.
+            ``metrics``), ``loop``, ``hold``, ``residuals``; of static models ``static-curve``; of latent
+            models ``structure`` and ``curves``; or one of `plot_linear`, which needs no record.
         record : record or data frame, optional
             Record that is drawn; by default the validation data, with the parameters that the errors on them
             belong to. A frame has the columns of the model.

@@ -10,13 +10,13 @@ from islands.facade.trials.feedthrough_selection import advance_split
 from islands.facade.trials.library import TrialLibrary
 from islands.facade.trials.prepared_data import PreparedData
 from islands.facade.trials.rate_selection import compute_errors
+from islands.models.form import is_static
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.split import Split
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment
-from islands.validation.evidence import ErrorNoise, is_static
-from islands.validation.recommendation import DECISIVE
+from islands.validation.evidence import DECISIVE, ErrorNoise
 from islands.validation.simple_models import assess_curve_models, assess_linear_model, assess_static_models
 
 #: Name of the step.

@@ -26,6 +26,7 @@ from islands.evolution.search_result import (
 from islands.models.coupled_latent import CoupledLatentModel
 from islands.models.coupled_narx import AnyModel, coupled_signals
 from islands.models.equations import name_gains, named_signals, named_statement
+from islands.models.form import is_linear, name_form, reads_inputs
 from islands.models.joint_quantities import list_joint_quantities
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
@@ -48,7 +49,6 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import PARTS, Assessment
 from islands.validation.coupled_assessment import CoupledAssessment
 from islands.validation.ensemble import Ensemble
-from islands.validation.evidence import is_linear, name_form, reads_inputs
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure, missing_structure
@@ -342,6 +342,7 @@ def _model_document(
         "named_signals": named_signals(model),
         "terms": terms_in_result(model, ensemble),
         **({"quantities": model.list_quantities()} if isinstance(model, LatentModel) else {}),
+        **({"laws": [asdict(each) for each in assessment.checks.laws]} if recommended else {}),
         "bands": bands_document(assessment.bands),
         "recordings": {
             part: {name: asdict(value) for name, value in by_name.items()}

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from islands.errors import lookup
+from islands.errors import ModelError, lookup
 from islands.models.state_space import StateSpace, find_resonances
 from islands.records.envelope import find_envelope
 from islands.report.figures.lines import VERTICES, downsample
@@ -48,8 +48,22 @@ _LARGEST = 10.0
 
 
 def draw_linear_system(system: StateSpace, kind: str = "bode") -> Figure:
-    """Draw a figure of a linear system; ``kind`` is a key of `LINEAR_FIGURES`."""
-    return lookup(LINEAR_FIGURES, kind, "figure")(system)
+    """Draw a figure of a linear system; ``kind`` is a key of `LINEAR_FIGURES`.
+
+    Raises
+    ------
+    ModelError
+        The system is static.
+    SettingsError
+        There is no such figure.
+    """
+    draw = lookup(LINEAR_FIGURES, kind, "figure")
+    if system.is_static:
+        raise ModelError(
+            f"a static model has no figure {kind}: its gain is that of all frequencies; take the figure "
+            "static-curve"
+        )
+    return draw(system)
 
 
 @house_style()

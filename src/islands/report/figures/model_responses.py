@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.errors import ModelError
+from islands.models.form import is_static
 from islands.models.operating_point import static_characteristic
 from islands.models.protocol import DynamicModel
 from islands.records.channel_names import parse_unit
@@ -89,10 +90,10 @@ def draw_responses(model: DynamicModel, record: Dataset) -> dict[str, Figure]:
     -------
     dict
         ``characteristic`` and ``step-response``; a figure whose equilibria are not unique or not stable, as
-        of models of hysteresis, is left out.
+        of models of hysteresis, is left out. A static model has none: see `draw_static_curve`.
     """
     varying = np.flatnonzero(np.ptp(record.u, axis=0))
-    if not varying.size:
+    if not varying.size or is_static(model):
         return {}
     channel = int(varying[0])
     signal = record.u[:, channel]

@@ -20,11 +20,17 @@ CURVES = "curves"
 #: Figures of a latent model: block diagram, curves of the units.
 LATENT_FIGURES = ("structure", CURVES)
 
+#: The figure of a static model: the output over its inputs, with the measured samples.
+STATIC_CURVE = "static-curve"
+
+#: Figures of a static model. Without a past, there are no states, and a held input gives the same output.
+STATIC_FIGURES = (FREE_RUN, STATIC_CURVE, "residuals")
+
 #: Figures of the linear system of a model about an operating point, which need no record.
 LINEAR_FIGURES = ("bode", "nyquist", "pole-map", "unit-step")
 
 #: Figures of a model on its data; see `islands.report.figures.availability`.
-MODEL_FIGURES = (FREE_RUN, *LATENT_FIGURES, LOOP, "hold", "residuals")
+MODEL_FIGURES = (FREE_RUN, STATIC_CURVE, *LATENT_FIGURES, LOOP, "hold", "residuals")
 
 #: Figures of a search: ``convergence`` of an evolution, ``islands`` of several islands.
 SEARCH_FIGURES = ("record", "front", "convergence", "islands")
@@ -32,13 +38,17 @@ SEARCH_FIGURES = ("record", "front", "convergence", "islands")
 #: Least number of islands of the searches that have a figure; others have it always.
 LEAST_ISLANDS: Mapping[str, int] = MappingProxyType({"convergence": 1, "islands": 2})
 
-#: Responses of a model; of a model with several equilibria, as of hysteresis, there are none.
+#: Responses of a model with a past; of one with several equilibria, as of hysteresis, there are none.
 RESPONSES = ("characteristic", "step-response")
 
 ALL_FIGURES = (*MODEL_FIGURES, *LINEAR_FIGURES, *SEARCH_FIGURES, *RESPONSES)
 
-#: The figure of a result that is drawn by default: measured output, free run with its band, and residual.
-OVERVIEW = (FREE_RUN,)
+#: The figures of a result that are drawn by default: measured output, free run with its band, and residual
+#: over time, and of a static model over its inputs.
+OVERVIEW = (FREE_RUN, STATIC_CURVE)
+
+#: The same as a text for `parse_figures`.
+OVERVIEW_TEXT = ",".join(OVERVIEW)
 
 
 def parse_figures(text: str) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from islands.report.figures.latent import draw_structure, draw_unit_curves
 from islands.report.figures.lines import break_line, downsample
 from islands.report.figures.names import FREE_RUN, LEAST_ISLANDS, LOOP
 from islands.report.figures.residuals import draw_residual_correlations
+from islands.report.figures.static_model import draw_static_curve
 from islands.report.figures.style import FRAME, MEASURED, RESIDUAL, blank, finish, house_style, label
 from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.assessment import Assessment, assess_residual
@@ -40,6 +41,12 @@ RecordFigure = Callable[[DynamicModel, Dataset, int, PredictionBands | None], Fi
 def _free_run_on(model: DynamicModel, record: Dataset, warm_up: int, bands: PredictionBands | None) -> Figure:
     band = None if bands is None else bands.predict(model, record, warm_up=warm_up)
     return draw_free_run(record, simulate_freely(model, record, warm_up).y, band=band)
+
+
+def _static_curve_on(
+    model: DynamicModel, record: Dataset, warm_up: int, bands: PredictionBands | None
+) -> Figure:
+    return draw_static_curve(model, [record], warm_up, bands)
 
 
 def _loop_on(model: DynamicModel, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
@@ -77,6 +84,7 @@ def _residuals_on(
 RECORD_FIGURES: Mapping[str, RecordFigure] = MappingProxyType(
     {
         "free-run": _free_run_on,
+        "static-curve": _static_curve_on,
         "structure": _structure_on,
         "curves": _curves_on,
         "loop": _loop_on,
@@ -140,6 +148,13 @@ def _draw_on_part(name: str, entry: Assessment, split: Split) -> Figure:
     return RECORD_FIGURES[name](entry.model, part, entry.warm_up, entry.bands)
 
 
+def _static_curve(entry: Assessment, split: Split) -> Figure:
+    """Draw the output of a static model over its inputs, with the samples of both parts of the data."""
+    return draw_static_curve(
+        entry.final_model, [split.estimation, split.validation], entry.warm_up, entry.bands
+    )
+
+
 def _curves(entry: Assessment, split: Split) -> Figure:
     """Draw the curves of the units of a latent model over the arguments of both parts of the data."""
     ensemble = None if entry.bands is None else entry.bands.ensemble
@@ -169,7 +184,7 @@ def _draw_residuals(tests: ResidualTests, structure: ResidualStructure) -> Figur
 #: Figures of an assessed model; those that need more than a part of the data are functions of their own.
 FIGURES: Mapping[str, ModelFigure] = MappingProxyType(
     {name: partial(_draw_on_part, name) for name in RECORD_FIGURES}
-    | {"curves": _curves, "hold": _hold, "residuals": _residuals}
+    | {"static-curve": _static_curve, "curves": _curves, "hold": _hold, "residuals": _residuals}
 )
 
 

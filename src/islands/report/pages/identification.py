@@ -26,8 +26,9 @@ _OVERLAY = "Free run of the recommended model over the validation data"
 #: What follows it if the parameters were estimated again on all data.
 _BEFORE_REFIT = ", with its parameters before the refit on all data"
 
-#: Captions of the figures of latent models, below the equation.
-_LATENT_FIGURES = {
+#: Captions of the figures of static and of latent models, below the equation.
+_STRUCTURE_FIGURES = {
+    "static-curve.svg": "Output over the inputs, with the measured samples",
     "structure.svg": "Structure: an arrow for each block of parameters that is not zero",
     "curves.svg": "Curves of the units",
 }
@@ -102,7 +103,7 @@ def identification_report(
         equation="" if facts.quantities else Markup(equation),
         plain=facts.model["equation"].splitlines(),
         units=write_one("result", "units", f=facts),
-        structure=[*_inline(_LATENT_FIGURES, figures), *_draw_linear_system(system)],
+        structure=[*_inline(_STRUCTURE_FIGURES, figures), *_draw_linear_system(system)],
         tables=tables,
         has_inclusion=any("inclusion" in headings for _, headings, _ in tables),
         unit=facts.unit,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from islands.estimation.static_models import identify_static_models
+from islands.models.form import is_static
 from islands.progress import Steps, StoppedError
 from islands.records.dataset import Dataset
 from islands.records.input_lead import advance_all_inputs
 from islands.simulation.initial_outputs import simulate_freely
-from islands.validation.evidence import is_static
 
 NOISE = 0.01
 

@@ -56,7 +56,7 @@ class Candidate:
         known = len(self.blocks) > 0
         rmse = sqrt(np.nanmean(self.blocks)) if known else nan
         return Assessment(
-            SimpleNamespace(size=self.size),
+            SimpleNamespace(free_size=self.size),
             {
                 "estimation": {
                     "one_step_ahead": Metrics(nan, nan, self.trained, nan),
@@ -76,10 +76,10 @@ class Candidate:
         return np.append(self.estimated * WHITE[:SAMPLES], validation if len(self.blocks) else np.inf)
 
 
-def recommend(sizes, entries, hysteresis, unit="", accurate=False):
+def recommend(entries, hysteresis, unit="", accurate=False):
     """Return a recommendation with its reasons."""
-    found = recommendation.recommend(sizes, entries, hysteresis, accurate)
-    return replace(found, reasons=state_reasons(found, sizes, entries, hysteresis, unit, accurate))
+    found = recommendation.recommend(entries, hysteresis, accurate)
+    return replace(found, reasons=state_reasons(found, entries, hysteresis, unit, accurate))
 
 
 def recommend_fittest(entries, mode, hysteresis, unit=""):
@@ -90,7 +90,7 @@ def recommend_fittest(entries, mode, hysteresis, unit=""):
 def chosen(*candidates, hysteresis=False):
     """Return the size of the recommended one of candidates that are sorted by their error."""
     ranked = sorted(candidates, key=lambda entry: np.mean(entry.blocks) if len(entry.blocks) else np.inf)
-    found = recommend([entry.size for entry in ranked], [entry.assessment() for entry in ranked], hysteresis)
+    found = recommend([entry.assessment() for entry in ranked], hysteresis)
     assert found.reasons
     return ranked[found.rank - 1].size
 
@@ -121,14 +121,14 @@ def test_a_slow_error_counts_little_where_the_noise_is_slow(pole, size):
 def test_samples_without_a_prediction_do_not_hide_a_large_validation_error():
     warm_up = np.full(3, nan)
     right = Candidate(6, np.append(warm_up, NOISE), estimated=0.0101)
-    lucky = Candidate(6, np.append(warm_up, 25.0 * NOISE), estimated=0.01)
-    assert recommend([6, 7], [right.assessment(), lucky.assessment()], False).rank == 1
+    lucky = Candidate(7, np.append(warm_up, 25.0 * NOISE), estimated=0.01)
+    assert recommend([right.assessment(), lucky.assessment()], False).rank == 1
 
 
 def test_a_check_decides_between_models_that_the_data_do_not_distinguish():
     candidates = Candidate(4, NOISE, bounded=False), Candidate(5, 1.01 * NOISE)
     assert chosen(*candidates) == 5
-    found = recommend([4, 5], [each.assessment() for each in candidates], False, "um")
+    found = recommend([each.assessment() for each in candidates], False, "um")
     least, error = (sqrt(factor * NOISE.mean()) for factor in (1.0, 1.01))
     assert found.reasons[0] == (
         "smallest of the models whose evidence (information criterion of the free run on all data) does not "
@@ -142,12 +142,12 @@ def test_a_check_decides_between_models_that_the_data_do_not_distinguish():
 def test_a_user_who_prefers_accuracy_gets_the_most_evidence_of_the_sound_models():
     candidates = Candidate(3, 1.03 * NOISE), Candidate(4, NOISE, estimated=0.00995)
     entries = [each.assessment() for each in candidates]
-    assert recommend([3, 4], entries, False).rank == 1
-    found = recommend([3, 4], entries, False, accurate=True)
+    assert recommend(entries, False).rank == 1
+    found = recommend(entries, False, accurate=True)
     assert found.rank == 2
     assert found.reasons[0].startswith("most evidence")
     entries[1] = replace(candidates[1], bounded=False).assessment()
-    assert recommend([3, 4], entries, False, accurate=True).rank == 1
+    assert recommend(entries, False, accurate=True).rank == 1
 
 
 def test_a_check_that_the_data_contradict_excludes_no_model():
@@ -158,7 +158,7 @@ def test_a_check_that_the_data_contradict_excludes_no_model():
         Candidate(2, 50 * NOISE, estimated=0.1),
     ]
     assert chosen(*candidates) == 4
-    found = recommend([7, 4, 2], [each.assessment() for each in candidates], False, "um")
+    found = recommend([each.assessment() for each in candidates], False, "um")
     assert found.reasons[0].startswith("most evidence")
     assert re.fullmatch(
         r"the data contradict the physics checks \(bounded at .* times the rate\): the models that pass them "
@@ -188,12 +188,12 @@ def test_every_model_is_left_or_excluded_once_and_the_smallest_left_is_recommend
         ]
         made.sort(key=lambda each: np.mean(each.blocks))
         sizes, entries = [each.size for each in made], [each.assessment() for each in made]
-        found = recommend(sizes, entries, hysteresis=bool(generator.integers(2)))
+        found = recommend(entries, hysteresis=bool(generator.integers(2)))
         excluded = [rank for each in found.excluded for rank in each.ranks]
         left = {*range(1, 7)}.difference(excluded)
         assert len(excluded) + len(left) == 6
         assert min(sizes[rank - 1] for rank in left) == sizes[found.rank - 1]
-        assert ("left out" in found.reasons[0]) == bool(list_rivals(found, sizes, entries))
+        assert ("left out" in found.reasons[0]) == bool(list_rivals(found, entries))
 
 
 def test_property_1_is_required_of_models_of_hysteresis_only():
@@ -201,15 +201,15 @@ def test_property_1_is_required_of_models_of_hysteresis_only():
     candidates = Candidate(3, NOISE, property_1=False), Candidate(5, 9 * NOISE)
     assert chosen(*candidates, hysteresis=True) == 5
     assert chosen(*candidates) == 3
-    found = recommend([3, 5], [each.assessment() for each in candidates], True)
+    found = recommend([each.assessment() for each in candidates], True)
     assert re.search(r"left out: 1 \(RMSE \S+\) without Property 1", found.reasons[0])
     only = Candidate(4, NOISE, property_1=False)
-    found = recommend([4], [only.assessment()], True)
+    found = recommend([only.assessment()], True)
     assert found.reasons[1].startswith("no model passes the physics checks")
 
 
 def test_the_first_model_is_recommended_if_every_free_run_diverges():
-    found = recommend([5, 3], [Candidate(5, []).assessment(), Candidate(3, []).assessment()], False)
+    found = recommend([Candidate(5, []).assessment(), Candidate(3, []).assessment()], False)
     assert found.rank == 1
     assert "diverges" in found.reasons[0]
 
@@ -242,6 +242,6 @@ def test_the_fittest_model_is_recommended_although_its_free_run_diverges():
 def test_an_output_that_moves_on_at_held_inputs_is_not_said_to_be_bounded(ranges, drift, words):
     """The level of a tank left its recorded range by 8.8 ranges, and was bounded."""
     entry = Candidate(2, NOISE, ranges=ranges, drift=drift)
-    reason = recommend([2], [entry.assessment()], hysteresis=False).reasons[1]
+    reason = recommend([entry.assessment()], hysteresis=False).reasons[1]
     assert re.match(f".*{words}", reason)
     assert ("bounded" in reason) == words.startswith("bounded")

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import islands
+from islands.models.form import is_linear
 from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.report.documents.result_folder import result_document
 from islands.report.text.statements import describe
-from islands.validation.evidence import is_linear
 from islands.validation.simple_models import assess_linear_model
 
 SETTINGS = {"library": "polynomial", "degree": 2, "lags": 2, "average": 1, "certificate": 0, "max_terms": 4}

@@ -12,10 +12,10 @@ from islands.facade.automatic.choice import choice_from_document
 from islands.facade.automatic.kind_choice import _select_kind, measure_share
 from islands.facade.automatic.preset_choice import choose_preset, fit_chosen_library
 from islands.facade.fit_settings import FitSettings
+from islands.models.form import name_form
 from islands.progress import ignore_progress, never_stop
 from islands.records.dataset import Dataset
 from islands.records.split import split
-from islands.validation.evidence import name_form
 from support.assessments import with_changes
 from support.known_records import runaway
 from support.portfolio_records import KINDS as RECORDS

@@ -6,10 +6,10 @@ import pytest
 import islands
 from islands.facade.trials.library import take_library
 from islands.facade.trials.static_selection import find_static
+from islands.models.form import name_form
 from islands.progress import Steps
 from islands.records.dataset import Dataset
 from islands.records.split import split
-from islands.validation.evidence import name_form
 from support.known_records import lag, slow, steps, white
 
 NOISE = 0.01

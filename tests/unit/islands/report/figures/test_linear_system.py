@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from islands.errors import ModelError
 from islands.models.state_space import StateSpace
 from islands.report.figures.linear_system import LINEAR_FIGURES, draw_bode, draw_linear_system, draw_pole_map
 from support.latent_systems import make_model
@@ -59,6 +60,12 @@ def test_bands_are_drawn_of_a_system_whose_uncertainty_is_known(kind):
     axes = [draw_linear_system(each, kind).axes[0] for each in (system, unsure)]
     without, with_bands = (len(each.lines) + len(each.collections) for each in axes)
     assert with_bands > without
+
+
+def test_a_static_system_has_no_figure():
+    model = make_model({"d": 2.0, "level": 1.0}, (), 0, input_names=("u+1",))
+    with pytest.raises(ModelError, match="take the figure static-curve"):
+        draw_linear_system(model.linearise())
 
 
 def test_a_far_zero_is_named_and_does_not_set_the_scale_of_the_poles():

@@ -33,3 +33,8 @@ def test_the_first_varying_input_steps_and_the_others_rest(record):
 
 def test_a_record_with_constant_inputs_has_no_response_figure():
     assert draw_responses(LAG, islands.Dataset(np.ones((100, 2)), RNG.normal(size=100), 1.0)) == {}
+
+
+def test_a_static_model_has_no_response(record):
+    gains = islands.make_model([(islands.parse("u2(k-1)"), 2.0)], ("offset+1", "valve+1"))
+    assert draw_responses(gains, record) == {}

@@ -58,6 +58,6 @@ def test_figures_are_named_in_a_list_or_all_at_once():
     assert names.parse_figures("loop, free-run,loop") == ("loop", "free-run")
     assert (names.parse_figures("all"), names.parse_figures("none")) == (names.ALL_FIGURES, ())
     with pytest.raises(
-        SettingsError, match=r"no figure 'lop': take one or several of free-run, structure, .*none"
+        SettingsError, match=r"no figure 'lop': take one or several of free-run, static-curve, .*none"
     ):
         names.parse_figures("free-run,lop")

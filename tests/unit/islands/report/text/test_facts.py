@@ -29,6 +29,15 @@ STRUCTURE = {
 AHEAD = STRUCTURE | {f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.5, "free_run": 0.94}}
 WHITE = {f"{RESIDUAL}.predictable_share": {"one_step_ahead": 0.02, "free_run": 0.02}}
 TERM = {"parameter": -0.9, "standard_error": 0.001, "inclusion": 1.0}
+LAW = {
+    "units": (1,),
+    "law": "saturation",
+    "over": "u_V",
+    "unit": "V",
+    "places": (-1.0, 1.5),
+    "has_line": True,
+    "deviation_percent": 0.4,
+}
 CHECK = {"text": "[u(k-1)] >= 0", "named": "[u_V(k-1)] >= 0", "target": 0.0, "value": -0.5}
 
 
@@ -54,7 +63,7 @@ RESULTS = {
         *({}, LOST, {f"{METRICS}.free_run.rmse": 1e-12}, {"linear": None}),
         *({"data.noise": 1.0}, {"data.noise": None} | WHITE),
     ],
-    "essence_physics": [{}]
+    "essence_physics": [{}, {"models.0.laws": [LAW, LAW | {"units": (2, 3), "has_line": False}]}]
     + [
         {
             "record.units.output": "rad/s",

@@ -3,9 +3,9 @@
 import pytest
 
 from islands.expressions.parsing import parse
+from islands.models.form import name_form
 from islands.models.narx import Model, canonical_order
 from islands.models.regressor import Regressor
-from islands.validation.evidence import name_form
 from support.latent_systems import make_model
 
 
