@@ -23,8 +23,9 @@ from islands.validation.evidence import join_errors, mean_square
 class AllDataFit:
     """Estimate of the parameters of a model on estimation data and validation data together.
 
-    The parameters stay if they cannot be estimated again, or if their errors on all data are smaller than those
-    of the estimate: least squares does not minimise the error of the free run. Both attributes are computed when they are first read.
+    The parameters stay if they cannot be estimated again, or if their errors on all data are smaller than
+    those of the estimate: least squares does not minimise the error of the free run. Both attributes are
+    computed when they are first read.
 
     Parameters
     ----------

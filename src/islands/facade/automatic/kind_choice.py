@@ -13,7 +13,7 @@ from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.search_result import ResultCallback, SearchResult, take_recommended
 from islands.facade.automatic.choice import Choice
-from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, percent, try_kinds
+from islands.facade.automatic.kind_trials import DEAD_TIMES, KindTrials, find_delays, percent, try_kinds
 from islands.facade.fit_settings import FitSettings
 from islands.facade.front import Front, StoppedFitError, find_linear_result, list_simple
 from islands.facade.library_fit import LibraryFit, fit_library
@@ -94,8 +94,11 @@ def choose_kind(
     linear = find_linear_result(record, split, free[0], settings, seed, steps) if free else None
     if linear and on_front:
         on_front(linear)
+    delays = settings.delays
+    if delays is None and linear:
+        delays = find_delays(linear.models[0].model)
     try:
-        return _choose_kind(record, split, libraries, settings, least, seed, steps, on_front)
+        return _choose_kind(record, split, libraries, settings, delays, least, seed, steps, on_front)
     except StoppedFitError:
         raise
     except StoppedError as stopped:
@@ -109,6 +112,7 @@ def _choose_kind(
     split: Split,
     libraries: Mapping[str, TrialLibrary],
     settings: FitSettings,
+    delays: Sequence[int] | None,
     least: int,
     seed: int,
     steps: Steps,
@@ -117,9 +121,9 @@ def _choose_kind(
     """Choose the kind of a record; see `choose_kind`."""
     estimation = split.estimation
     if estimation.output_range > 0.0:
-        trials = try_kinds(estimation, libraries, settings.delays, steps)
+        trials = try_kinds(estimation, libraries, delays, steps)
     else:
-        trials = KindTrials(tuple(settings.delays or ()), {list(libraries)[-1]: inf})
+        trials = KindTrials(tuple(delays or ()), {list(libraries)[-1]: inf})
     promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
     promising = promising or list(trials.promising[:1])
     late = {kind: library.with_delays(trials.delays) for kind, library in libraries.items()}

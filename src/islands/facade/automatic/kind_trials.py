@@ -9,8 +9,12 @@ from functools import partial
 from math import inf, isfinite
 from types import MappingProxyType
 
+import numpy as np
+
 from islands.facade.trials.held_out_error import hold_out, measure_library
 from islands.facade.trials.library import TrialLibrary
+from islands.models.latent import LatentModel
+from islands.models.protocol import DynamicModel
 from islands.progress import Steps
 from islands.records.channel_names import parse_channel_name
 from islands.records.dataset import Dataset
@@ -84,6 +88,17 @@ def try_kinds(
     chosen = tuple(delays) if any(delays) else ()
     errors = {kind: measure(kind, chosen) for kind in libraries}
     return KindTrials(chosen, MappingProxyType(errors))
+
+
+def find_delays(linear: DynamicModel) -> tuple[int, ...]:
+    """Return by how many samples the response of a linear model to each input is late.
+
+    Lags of the library cover a short dead time, which counts as 0.
+    """
+    assert isinstance(linear, LatentModel)
+    # The output reads an input through D without the sample that a state takes.
+    late = np.array(linear.delays) - (linear.layout.split(linear.theta)["D"].ravel() != 0.0)
+    return tuple(int(delay) if delay >= _LEAST_DELAY else 0 for delay in late)
 
 
 def _estimate_delays(record: Dataset) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from islands.facade.automatic.kind_choice import measure_share, recommend_kind
 from islands.facade.front import Front
 from islands.facade.latent_identification import search_latent
 from islands.facade.trials.prepared_data import PreparedData
+from islands.models.form import is_linear
 from islands.models.narx import Model
 from islands.progress import Steps
 from islands.records.dataset import Dataset
@@ -75,7 +76,8 @@ def compare_latent(
     measured = {name: measure_share(each, found.split.estimation) for name, each in bounded.items()}
     kind, reason = recommend_kind(bounded, measured)
     choice = replace(choice, errors=MappingProxyType({**choice.errors, **measured}))
-    if kind == LATENT:
+    # A linear model of the trial is no reason to evolve curves.
+    if kind == LATENT and not is_linear(latent.recommended.model):
         sentence = f"Preset auto chose latent (state spaces with static curves), because {reason}."
         late = "Dead times are those of the linear model, or states."
         choice = replace(choice, kind=LATENT, delays=(), reasons=(sentence, late))

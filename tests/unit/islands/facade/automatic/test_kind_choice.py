@@ -75,7 +75,7 @@ def test_dead_time_is_added_to_the_lags():
 @pytest.mark.ci
 def test_models_without_a_dead_time_compete_with_those_that_have_one(monkeypatch):
     """The validation data refuse a dead time that the inspection takes for one."""
-    monkeypatch.setattr("islands.facade.automatic.kind_trials._estimate_delays", lambda _: (20,))
+    monkeypatch.setattr("islands.facade.automatic.kind_choice.find_delays", lambda _: (20,))
     choice, result = choose(record("first order", 300))
     assert choice.delays == tuple(result.settings["delays"]) == ()
     assert "A dead time of 20 samples is not used" in choice.reasons[1]
