@@ -94,9 +94,9 @@ def choose_kind(
     linear = find_linear_result(record, split, free[0], settings, seed, steps) if free else None
     if linear and on_front:
         on_front(linear)
-    delays = settings.delays
+    delays: Sequence[Sequence[int]] | None = None if settings.delays is None else (settings.delays,)
     if delays is None and linear:
-        delays = find_delays(linear.models[0].model)
+        delays = (), find_delays(linear.models[0].model)
     try:
         return _choose_kind(record, split, libraries, settings, delays, least, seed, steps, on_front)
     except StoppedFitError:
@@ -112,7 +112,7 @@ def _choose_kind(
     split: Split,
     libraries: Mapping[str, TrialLibrary],
     settings: FitSettings,
-    delays: Sequence[int] | None,
+    delays: Sequence[Sequence[int]] | None,
     least: int,
     seed: int,
     steps: Steps,
@@ -123,7 +123,7 @@ def _choose_kind(
     if estimation.output_range > 0.0:
         trials = try_kinds(estimation, libraries, delays, steps)
     else:
-        trials = KindTrials(tuple(delays or ()), {list(libraries)[-1]: inf})
+        trials = KindTrials(tuple(settings.delays or ()), {list(libraries)[-1]: inf})
     promising = [kind for kind in trials.promising if isfinite(trials.errors[kind])]
     promising = promising or list(trials.promising[:1])
     late = {kind: library.with_delays(trials.delays) for kind, library in libraries.items()}

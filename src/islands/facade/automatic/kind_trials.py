@@ -57,10 +57,10 @@ class KindTrials:
 def try_kinds(
     record: Dataset,
     libraries: Mapping[str, TrialLibrary],
-    delays: Sequence[int] | None,
+    delays: Sequence[Sequence[int]] | None,
     steps: Steps,
 ) -> KindTrials:
-    """Compare small models of every kind, with the dead times that the record shows.
+    """Compare small models of every kind, with the dead times of the least error.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ def try_kinds(
         Estimation data without missing values, whose output is not constant.
     libraries : mapping
         Library and constraints of each kind that may be chosen, the simplest first.
-    delays : sequence of int or None
-        Dead times; None estimates them.
+    delays : sequence of sequence of int or None
+        Dead times that are tried; by default none, and those of the response to each input.
     steps : Steps
     """
     splits = hold_out(record)
@@ -84,10 +84,12 @@ def try_kinds(
 
     if delays is None:
         steps(DEAD_TIMES, None)
-        delays = steps.attempt(DEAD_TIMES, partial(_estimate_delays, record)) or ()
-    chosen = tuple(delays) if any(delays) else ()
-    errors = {kind: measure(kind, chosen) for kind in libraries}
-    return KindTrials(chosen, MappingProxyType(errors))
+        delays = (), steps.attempt(DEAD_TIMES, partial(_estimate_delays, record)) or ()
+    tried = []
+    for late in dict.fromkeys(tuple(each) if any(each) else () for each in delays):
+        errors = {kind: measure(kind, late) for kind in libraries}
+        tried.append(KindTrials(late, MappingProxyType(errors)))
+    return min(tried, key=lambda each: min(each.errors.values()))
 
 
 def find_delays(linear: DynamicModel) -> tuple[int, ...]:
