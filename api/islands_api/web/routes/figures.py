@@ -12,6 +12,7 @@ import structlog
 from fastapi import APIRouter, Path, Query, Response
 
 from islands.errors import IslandsError, SettingsError, suggest
+from islands.models.latent import LatentModel
 from islands.persistence.models import model_from_json
 from islands.report.figures.availability import list_model_figures
 from islands.report.figures.names import LEAST_ISLANDS, MODEL_FIGURES, SEARCH_FIGURES
@@ -252,7 +253,13 @@ async def _list_model_figures(state: AppState, job: str, found: StoredModel) -> 
     document = await state.run_blocking(state.store.results.document, job) or {}
     if "outputs" in document:
         return tuple(f"free-run-{number + 1}" for number in range(len(document["outputs"])))
-    return list_model_figures(model_from_json(found.file, f"model {found.rank}"), document["loop"])
+    is_latent, is_static = (
+        found.document.get("kind") == LatentModel.kind,
+        found.document.get("form") == "static",
+    )
+    # Other models have the same figures whatever their terms are.
+    model = model_from_json(found.file, f"model {found.rank}") if is_latent or is_static else None
+    return list_model_figures(model, document["loop"])
 
 
 async def _count_outputs(state: AppState, job: str) -> int:

@@ -13,16 +13,17 @@ from islands.report.figures.names import (
 )
 
 
-def list_model_figures(model: DynamicModel, has_loop: bool) -> tuple[str, ...]:
+def list_model_figures(model: DynamicModel | None, has_loop: bool) -> tuple[str, ...]:
     """Return the names of the figures of a model, in their order.
 
     Parameters
     ----------
-    model : DynamicModel
+    model : DynamicModel or None
+        None for an equation with a past, whose figures do not depend on its terms.
     has_loop : bool
         Whether the output over the input of the record is a loop.
     """
-    if is_static(model):
+    if model is not None and is_static(model):
         return STATIC_FIGURES
     absent = {STATIC_CURVE} if has_loop else {STATIC_CURVE, LOOP}
     if not isinstance(model, LatentModel):
