@@ -31,7 +31,14 @@ from islands.records.split import Split
 from islands.rounding import RESOLUTION, ROUNDING
 from islands.simulation.blocks import UnitRun, simulate_units
 from islands.simulation.initial_outputs import simulate_freely
-from islands.validation.evidence import DECISIVE, ErrorNoise, join_errors, measure_lack, measure_size
+from islands.validation.evidence import (
+    DECISIVE,
+    ErrorNoise,
+    join_errors,
+    mean_square,
+    measure_lack,
+    measure_size,
+)
 from islands.validation.unit_curves import Abscissa, locate_arguments
 
 #: Steps of the estimation of a replacement.
@@ -221,7 +228,7 @@ def _estimate(model: LatentModel, split: Split, warm_up: int, has_line: bool) ->
 
 def _measure_lack(candidates: Sequence[_Candidate], split: Split) -> NDArray[np.float64]:
     """Return the information criteria of models, with the noise of the closest one."""
-    closest = min(candidates, key=lambda each: float(np.nanmean(each.errors**2)))
+    closest = min(candidates, key=lambda each: mean_square(each.errors))
     noise = ErrorNoise.fit(closest.errors, split.segments)
     models, sizes = [each.model for each in candidates], [each.size for each in candidates]
     squares = [noise.measure(each.errors) for each in candidates]
