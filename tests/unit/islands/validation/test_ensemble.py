@@ -9,7 +9,7 @@ import pytest
 from islands.estimation.estimate import estimate
 from islands.estimation.estimator_table import LEAST_SQUARES, refinement_criterion
 from islands.expressions.parsing import parse
-from islands.facade.fit import fit
+from islands.facade.fit import fit_record
 from islands.models.narx import make_model
 from islands.models.regressor import regressor
 from islands.records.dataset import Dataset
@@ -171,7 +171,7 @@ def test_noise_of_initial_outputs_does_not_exclude_the_law_of_a_slow_process():
 @pytest.mark.nightly
 def test_the_terms_of_a_recommended_law_are_certain():
     """y(k-1) had a probability of 0.50, because y(k) = 0.73 y(k-3) + ... is the same law."""
-    found = fit(first_order(0.02, 1))
+    found = fit_record(first_order(0.02, 1), library="polynomial", equations_only=True)
     assert found.best.model.parameter_names == ("y(k-1)", "u1(k-1)")
     assert min(found.best.inclusion) > 0.95
     assert "doubtful" not in str(found)
