@@ -105,9 +105,11 @@ def describe_fits(found: SearchResult) -> list[dict[str, Any]]:
         All models so far. Their errors are those of the free run on the estimation data.
     """
     front: list[dict[str, Any]] = []
+    least = inf
     errors = [(each.model, each.metrics["estimation"]["free_run"].rmse) for each in found.models]
     for model, error in sorted(errors, key=lambda each: (each[0].free_size, each[1])):
-        if error < min((each["error"] for each in front), default=inf):
+        if error < least:
+            least = error
             text = model.equation().named
             if isinstance(model, LatentModel):
                 text = f"{name_form(model)}, {model.structure}"

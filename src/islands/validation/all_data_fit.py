@@ -15,9 +15,8 @@ from islands.estimation.refit import refit
 from islands.models.protocol import DynamicModel
 from islands.progress import Failure, attempt
 from islands.records.split import Split, join_parts
-from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.outcome import EvaluationOutcome
-from islands.validation.evidence import join_errors, mean_square
+from islands.validation.evidence import mean_square, measure_errors
 
 
 class AllDataFit:
@@ -38,12 +37,20 @@ class AllDataFit:
         Constraints under which the parameters were estimated.
     warm_up : int
         Number of samples before the first prediction.
+    errors : ndarray, shape (samples,)
+        Errors of the free runs with these parameters; see `measure_errors`.
     """
 
     def __init__(
-        self, model: DynamicModel, criterion: Criterion | None, split: Split, constraints: str, warm_up: int
+        self,
+        model: DynamicModel,
+        criterion: Criterion | None,
+        split: Split,
+        constraints: str,
+        warm_up: int,
+        errors: NDArray[np.float64],
     ) -> None:
-        self._given, self._criterion, self._split = model, criterion, split
+        self._given, self._criterion, self._split = (model, errors), criterion, split
         self._constraints, self._warm_up = constraints, warm_up
 
     @property
@@ -58,17 +65,12 @@ class AllDataFit:
 
     @cached_property
     def _found(self) -> tuple[DynamicModel, NDArray[np.float64]]:
-        given = self._given, self._measure(self._given)
         if self._criterion is None:
-            return given
+            return self._given
         record = join_parts(self._split)
-        arguments = self._given, self._criterion, record, self._constraints, self._warm_up
+        arguments = self._given[0], self._criterion, record, self._constraints, self._warm_up
         estimated = attempt(partial(refit, *arguments))
         if isinstance(estimated, Failure | EvaluationOutcome):
-            return given
-        found = estimated, self._measure(estimated)
-        return min(found, given, key=lambda each: mean_square(each[1]))
-
-    def _measure(self, model: DynamicModel) -> NDArray[np.float64]:
-        parts = (self._split.estimation, self._split.validation)
-        return join_errors(*((part, simulate_freely(model, part, self._warm_up)) for part in parts))
+            return self._given
+        found = estimated, measure_errors(estimated, self._split, self._warm_up)
+        return min(found, self._given, key=lambda each: mean_square(each[1]))

@@ -23,7 +23,7 @@ from islands.simulation.initial_outputs import has_estimated_start, simulate_fre
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting, one_step_ahead
 from islands.validation.all_data_fit import AllDataFit
-from islands.validation.evidence import mean_square, measure_size
+from islands.validation.evidence import join_errors, mean_square, measure_size
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics, missing_physics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure, missing_structure
@@ -308,7 +308,10 @@ def assess(
         _compute_information(split.estimation, runs["estimation"]["one_step_ahead"], free),
         Checks(model, split, warm_up),
         first,
-        AllDataFit(model, criterion, split, constraints, first),
+        AllDataFit(
+            *(model, criterion, split, constraints, first),
+            join_errors(*((getattr(split, part), runs[part]["free_run"]) for part in PARTS)),
+        ),
         check_constraints(model, constraints),
         recordings,
         criterion=criterion,

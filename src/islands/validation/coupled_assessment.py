@@ -12,7 +12,7 @@ from islands.models.coupled_narx import CoupledModel
 from islands.records.coupled import CoupledRecord, CoupledSplit
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.validation.assessment import PARTS
-from islands.validation.evidence import join_errors, mean_square
+from islands.validation.evidence import mean_square, measure_errors
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.prediction_bands import OutputBands
@@ -84,8 +84,7 @@ class CoupledAssessment:
     @cached_property
     def errors(self) -> NDArray[np.float64]:
         """Errors of the common free runs on both parts of the data; see `join_errors`."""
-        parts = (self.split.estimation, self.split.validation)
-        return join_errors(*((part, free_run(self.model, part, self.warm_up)) for part in parts))
+        return measure_errors(self.model, self.split, self.warm_up)
 
     @property
     def validation_error(self) -> float:

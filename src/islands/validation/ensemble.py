@@ -36,6 +36,7 @@ from islands.validation.evidence import (
     count_terms,
     join_errors,
     mean_square,
+    measure_errors,
     measure_lack,
     measure_size,
 )
@@ -342,8 +343,7 @@ def _weigh(
         return []
     models = [_fit_all_data(candidate, split, constraints, warm_up) for candidate in candidates]
     errors = [_measure_errors(model, split, warm_up) for model in models]
-    closest = min(errors, key=mean_square)
-    noise = ErrorNoise.fit(closest, split.segments)
+    noise = ErrorNoise.fit_closest(errors, split.segments)
     squares = [noise.measure(each) for each in errors]
     sizes, terms = [measure_size(model) for model in models], count_terms(models)
     lack = measure_lack(models, sizes, squares, noise.samples, terms)
@@ -370,7 +370,10 @@ def _fit_all_data(
     if isinstance(split, CoupledSplit) or isinstance(candidate.model, CoupledModel):
         return candidate.model
     fit = candidate.all_data
-    return (fit or AllDataFit(candidate.model, candidate.criterion, split, constraints, warm_up)).model
+    if fit is None:
+        errors = measure_errors(candidate.model, split, warm_up)
+        fit = AllDataFit(candidate.model, candidate.criterion, split, constraints, warm_up, errors)
+    return fit.model
 
 
 def measure_square(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> float:

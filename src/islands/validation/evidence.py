@@ -8,7 +8,7 @@ parameters are estimated count as well: after one step or one bump, the rest of 
 and a constant is as good there as any model.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf, log
 
@@ -20,10 +20,12 @@ from islands.models.coupled_narx import AnyModel, CoupledModel
 from islands.models.form import is_linear
 from islands.models.latent import LatentModel
 from islands.models.narx import Model
-from islands.records.coupled import AnyRecord, CoupledRecord
+from islands.records.coupled import AnyRecord, CoupledRecord, CoupledSplit
 from islands.records.noise_model import NoiseModel, fit_noise, white_noise
 from islands.records.segments import count_runs
+from islands.records.split import Split
 from islands.rounding import RESOLUTION
+from islands.simulation.initial_outputs import simulate_freely
 from islands.simulation.predictors import Simulation
 
 #: Difference of the evidence of two models that do not count as equal: very strong evidence (Kass & Raftery,
@@ -68,6 +70,12 @@ def join_errors(*parts: tuple[AnyRecord, Simulation]) -> NDArray[np.float64]:
     return relative
 
 
+def measure_errors(model: AnyModel, split: Split | CoupledSplit, warm_up: int) -> NDArray[np.float64]:
+    """Return the errors of the free runs of a model on both parts of the data; see `join_errors`."""
+    parts = split.estimation, split.validation
+    return join_errors(*((part, simulate_freely(model, part, warm_up)) for part in parts))
+
+
 def mean_square(errors: NDArray[np.float64]) -> float:
     """Return the mean square of errors; infinite after a divergence.
 
@@ -100,6 +108,11 @@ class ErrorNoise:
     models: tuple[NoiseModel, ...]
     segments: tuple[int, ...]
     samples: int
+
+    @classmethod
+    def fit_closest(cls, errors: Iterable[NDArray[np.float64]], segments: Sequence[int]) -> "ErrorNoise":
+        """Fit the noise of the closest of several models; see `fit`."""
+        return cls.fit(min(errors, key=mean_square), segments)
 
     @classmethod
     def fit(cls, errors: NDArray[np.float64], segments: Sequence[int]) -> "ErrorNoise":

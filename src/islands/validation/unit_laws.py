@@ -30,12 +30,10 @@ from islands.records.dataset import Dataset
 from islands.records.split import Split
 from islands.rounding import RESOLUTION, ROUNDING
 from islands.simulation.blocks import UnitRun, simulate_units
-from islands.simulation.initial_outputs import simulate_freely
 from islands.validation.evidence import (
     DECISIVE,
     ErrorNoise,
-    join_errors,
-    mean_square,
+    measure_errors,
     measure_lack,
     measure_size,
 )
@@ -228,8 +226,7 @@ def _estimate(model: LatentModel, split: Split, warm_up: int, has_line: bool) ->
 
 def _measure_lack(candidates: Sequence[_Candidate], split: Split) -> NDArray[np.float64]:
     """Return the information criteria of models, with the noise of the closest one."""
-    closest = min(candidates, key=lambda each: mean_square(each.errors))
-    noise = ErrorNoise.fit(closest.errors, split.segments)
+    noise = ErrorNoise.fit_closest((each.errors for each in candidates), split.segments)
     models, sizes = [each.model for each in candidates], [each.size for each in candidates]
     squares = [noise.measure(each.errors) for each in candidates]
     return measure_lack(models, sizes, squares, noise.samples, 1)
@@ -237,14 +234,12 @@ def _measure_lack(candidates: Sequence[_Candidate], split: Split) -> NDArray[np.
 
 def _measure(model: LatentModel, split: Split, warm_up: int, has_line: bool = False) -> _Candidate:
     """Return a model with its errors; its last unit is the law."""
-    runs = [(each, simulate_freely(model, each, warm_up)) for each in (split.estimation, split.validation)]
+    errors = measure_errors(model, split, warm_up)
     operations = sum(parse_unit(each).operations - 1 for each in model.units if each not in LAWS)
     redundant = sum(each in _HOMOGENEOUS for each in model.units)
     size = measure_size(model) + operations - redundant
     (run,) = simulate_units(model, split.estimation, warm_up, np.array([model.parameters]))
-    return _Candidate(
-        model, join_errors(*runs), size, _find_name(model, run, split.estimation, has_line), has_line, run
-    )
+    return _Candidate(model, errors, size, _find_name(model, run, split.estimation, has_line), has_line, run)
 
 
 def _find_name(model: LatentModel, run: UnitRun, record: Dataset, has_line: bool) -> str:

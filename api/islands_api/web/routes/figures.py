@@ -253,12 +253,9 @@ async def _list_model_figures(state: AppState, job: str, found: StoredModel) -> 
     document = await state.run_blocking(state.store.results.document, job) or {}
     if "outputs" in document:
         return tuple(f"free-run-{number + 1}" for number in range(len(document["outputs"])))
-    is_latent, is_static = (
-        found.document.get("kind") == LatentModel.kind,
-        found.document.get("form") == "static",
-    )
     # Other models have the same figures whatever their terms are.
-    model = model_from_json(found.file, f"model {found.rank}") if is_latent or is_static else None
+    is_read = found.document.get("kind") == LatentModel.kind or found.document.get("form") == "static"
+    model = model_from_json(found.file, f"model {found.rank}") if is_read else None
     return list_model_figures(model, document["loop"])
 
 

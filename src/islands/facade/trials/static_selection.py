@@ -2,8 +2,6 @@
 
 from math import log
 
-import numpy as np
-
 from islands.errors import RecordError
 from islands.evolution.search_result import take_recommended
 from islands.facade.trials.feedthrough_selection import advance_split
@@ -63,8 +61,7 @@ def find_static(split: Split, library: TrialLibrary, steps: Steps) -> PreparedDa
         other = compute_errors(split, library, 1) / split.estimation.output_range
     except RecordError:
         return None  # too short for the library: the search reports it
-    closest = min(own, other, key=lambda each: float(np.nanmean(each**2)))
-    noise = ErrorNoise.fit(closest, split.validation.segments)
+    noise = ErrorNoise.fit_closest((own, other), split.validation.segments)
     gain = log(noise.measure(own)) - log(noise.measure(other))
     return PreparedData(advanced, 1, late) if noise.samples * gain <= DECISIVE else None
 

@@ -10,6 +10,7 @@ from islands.models.regressor import Regressor
 from islands.records.dataset import Dataset
 from islands.records.split import split
 from islands.validation.all_data_fit import AllDataFit
+from islands.validation.evidence import measure_errors
 
 TERMS = ("y(k-1)", "u(k-1)", "u(k-1)^2")
 
@@ -27,12 +28,16 @@ def fit_terms(record, terms=TERMS):
     return estimate([Regressor(islands.parse(each)) for each in terms], record).model
 
 
+def fit_all(model, criterion, parts):
+    return AllDataFit(model, criterion, parts, "none", 1, measure_errors(model, parts, 1))
+
+
 @pytest.mark.parametrize("criterion", [LEAST_SQUARES, refinement_criterion(None)])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_no_fit_has_larger_errors_than_the_given_parameters(criterion, seed):
     parts = split(make_staircase(seed))
     model = fit_terms(parts.estimation)
-    given, fitted = (AllDataFit(model, each, parts, "none", 1) for each in (None, criterion))
+    given, fitted = (fit_all(model, each, parts) for each in (None, criterion))
     assert given.model == model
     assert np.nanmean(fitted.errors**2) <= np.nanmean(given.errors**2)
 
@@ -40,7 +45,7 @@ def test_no_fit_has_larger_errors_than_the_given_parameters(criterion, seed):
 def test_the_parameters_of_a_free_run_fit_do_not_depend_on_which_part_is_held_out():
     record = make_staircase(2)
     runs = [
-        AllDataFit(fit_terms(parts.estimation), refinement_criterion(None), parts, "none", 1).model
+        fit_all(fit_terms(parts.estimation), refinement_criterion(None), parts).model
         for parts in (split(record, 0.25), split(record, 0.5))
     ]
     np.testing.assert_allclose(runs[0].theta, runs[1].theta, rtol=2e-2)
